@@ -19,7 +19,7 @@ from px4_steps.hover_flight import HoverFlight, NotFlown
 from px4_steps.rate_experiment import AXES, experiment, responses
 from px4_steps.step_response import distance, figures
 
-from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.processes.node_environment import environment
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.report.figures import style
@@ -127,8 +127,7 @@ def main() -> int:
     try:
         px4 = Px4Installation.find(options.px4_dir)
         out = make_folder(options.out, "rate-steps")
-        if is_cold():
-            warm_up()
+        prepare(print)
         responses = []
         for name, autopilot in ((STAND_IN, None), (PX4, px4)):
             print(f"flying the steps with {name}", flush=True)

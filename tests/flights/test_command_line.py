@@ -41,8 +41,8 @@ OPTIONS = [
     (["--payload-mass", "9"], "payload mass 9 kg is outside 0..2 kg", ""),
     (["--wind", "1", "2"], "--wind: expected 3 arguments", ""),
     (["--wind", "1", "2", "nan"], "'nan' is not a wind: a number in m/s", ""),
-    (["--seed", "1.5"], "'1.5' is not a seed: a whole number, 0 or more", ""),
-    (["--seed", "99999999999"], "seed 99999999999 is outside 0..2147483647", ""),
+    (["--seed", "1.5"], "'1.5' is not a seed: a whole number from 0 to 2147483647", ""),
+    (["--seed", "99999999999"], "'99999999999' is not a seed: a whole number from 0 to", ""),
     (["--bogus"], "unrecognized arguments: --bogus", ""),
 ]
 TRAJECTORIES = [

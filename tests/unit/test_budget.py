@@ -14,7 +14,9 @@ from uam_lab.budget import flown, report
 from uam_lab.budget.flown import Budget, CoreShares
 from uam_lab.budget.path import SEGMENTS, NoTicks, tick_path, work
 from uam_lab.budget.shuttle import shuttle
+from uam_lab.cli.main import main
 from uam_lab.flight.observer import Observer
+from uam_lab.processes.interrupts import INTERRUPTED
 from uam_msgs_py.node.tick_times import COLUMNS, PARTS
 
 MS = 1_000_000  # [ns]
@@ -162,6 +164,22 @@ def test_picture_table_and_json_are_written(tmp_path):
     (layout,) = written["layouts"].values()
     assert layout["latency_ms"]["p99"] == 991.0
     assert layout["path_ms"]["mean of all ticks"]["b"]["wake-up"] == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_a_layout_that_fails_does_not_cost_the_other_one(
+    tmp_path, monkeypatch, capsys, interrupted
+):
+    def fly(layout, settings, observer, stop):
+        if layout == flown.LAYOUTS[0]:
+            return budget(tmp_path)
+        stop.count += interrupted
+        raise NoTicks("no tick times of mission")
+
+    monkeypatch.setattr(flown, "fly", fly)
+    assert main(["budget", "--out", str(tmp_path)]) == (INTERRUPTED if interrupted else 1)
+    assert capsys.readouterr().err == "uam budget: fused: no tick times of mission\n"
+    assert list(json.loads((tmp_path / "budget.json").read_text())["layouts"]) == ["separate"]
 
 
 def test_cores_are_those_between_take_off_and_landing(monkeypatch):

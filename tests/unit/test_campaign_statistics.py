@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_lab.campaign.campaign_report import _with_band
 from uam_lab.campaign.statistics import BINS, percentile, share, sliced
+from uam_lab.results.templates import render
 
 
 def test_the_band_of_a_share_is_wilsons():
@@ -40,6 +42,19 @@ def test_few_flights_give_no_end_of_the_band():
     middle, low, high = percentile(np.array([1.0, 2.0, np.nan, 3.0]), 99.0)
     assert middle == pytest.approx(2.98) and low <= middle and high == math.inf
     assert all(math.isnan(one) for one in percentile(np.array([np.nan]), 50.0))
+
+
+def test_no_flight_with_errors_gives_no_percentile():
+    assert _with_band(percentile(np.array([np.nan]), 50.0), 3, "m") == "unknown"
+
+
+def test_the_page_says_how_many_flights_a_step_has():
+    values = np.arange(45.0)
+    slices = {"wind": sliced(values, values > 40.0, values)}  # two bins: 23 and 22
+    lists = dict.fromkeys(("heads", "percentiles", "worst", "outcomes"), [])
+    texts = dict.fromkeys(("vehicle", "sentence", "picture", "command"), "x")
+    page = render("uam_lab.campaign", "campaign.html.j2", slices=slices, **lists, **texts)
+    assert "Each step is 22 or 23 of 45 flights." in page
 
 
 def test_a_slice_shows_where_flights_fail():

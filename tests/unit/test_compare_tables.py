@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from uam_lab.campaign.trial import TrialResult
-from uam_lab.compare import tables
-from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
+from uam_control.profiles.profile import default_profile
+from uam_control.vehicle import load_description
+from uam_lab.campaign.trial import Trial, TrialResult
+from uam_lab.compare import comparison_report, modularity, plan, tables
+from uam_lab.compare.modularity import ModularityEvidence
+from uam_lab.compare.plan import ASMC1, ASMC2, FROZEN, PROPOSED
 
 
 def flight(label, seed, rms, mass=0.2, outcome="completed"):
@@ -37,6 +40,44 @@ def test_a_row_is_the_mean_with_students_interval_over_seeds():
     assert row.mean[0] == pytest.approx(4.0) and row.worst[7] == pytest.approx(7.0)
     assert row.half_width[0] == pytest.approx(4.3027 * 2.0 / np.sqrt(3.0), rel=1e-4)
     assert np.isnan(tables.rows(flights[:2])[0].half_width).all()
+
+
+def test_a_flight_without_take_off_does_not_count_and_is_told():
+    grounded = flight(PROPOSED, 3, np.nan, outcome="refused")
+    flights = [flight(PROPOSED, 1, 0.01), flight(PROPOSED, 2, 0.02), grounded]
+    row, other, never = tables.rows(
+        [*flights, *(flight(ASMC1, s, 3.0) for s in (1, 2)), flight(ASMC2, 1, np.nan, 0.2, "lost")]
+    )
+    assert (row.flown, row.seeds, row.mean[0]) == (2, 2, pytest.approx(0.015))
+    assert row.half_width[0] > 0.0 and row.worst[0] == 0.02
+    assert row.shortfall == "1 of 3 not completed, 1 of them without take-off: no errors"
+    said = " ".join(tables.claims([row, other, never]))
+    assert "One seed only" not in said and "no significant difference" not in said
+    assert f"with {PROPOSED} than with {ASMC2}: holds in no column; unknown for x, y" in said
+    assert "| - | - | - |" in tables.as_markdown([row, other, never])
+    assert "nan" not in tables.as_markdown([row, other, never])
+    said = tables.claims(tables.rows([*flights, flight(ASMC1, 1, 3.0)]))
+    assert said[0] == f"One seed only, without a confidence interval: {ASMC1}."
+
+
+def test_a_report_without_the_papers_rows_overlays_the_first_ones(tmp_path, make_flight):
+    series = tmp_path / "series.parquet"
+    make_flight().write(series)
+    trial = Trial(FROZEN, default_profile("modular"), 0.2, 1, keep=series)
+    modular = ModularityEvidence((flight(FROZEN, 1, 0.1),), ())
+    facts = dict.fromkeys(("vehicle", "scenario", "command"), "x")
+    facts |= {"payloads_kg": (0.2,), "seeds": (1,), "profiles": {}, "budgets": {}}
+    results = [flight(FROZEN, 1, 0.1)]
+    written = comparison_report.write(tmp_path, [trial], results, modular, facts)
+    assert f"overlaid: {FROZEN}." in written.page.read_text()
+    assert (tmp_path / "figures" / "position_errors.png").exists()
+
+
+def test_the_flights_of_the_modularity_have_the_effects_of_the_plant(tmp_path):
+    effects = {"downwash": True}
+    flights = plan.Flights(load_description(), "hover", (0.2,), (1,), effects=effects)
+    made = modularity.trials(default_profile("modular"), flights, tmp_path / "kept.parquet")
+    assert [one.vehicle_changes for one in made] == 4 * [{"effects": effects}]
 
 
 def test_degradation_is_the_papers():

@@ -169,6 +169,13 @@ def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
         load_scenario(csv_file(tmp_path, **changes))
 
 
+def test_a_file_that_is_no_utf_8_is_refused(tmp_path):
+    file = tmp_path / "latin.csv"
+    file.write_bytes("t,px,py,pz,Höhe\n".encode("latin-1"))
+    with pytest.raises(ScenarioError, match=r"latin.csv: not a text in UTF-8"):
+        load_scenario(str(file))
+
+
 def test_a_jump_has_no_smooth_curve(tmp_path):
     rows = [f"{0.01 * i:.2f},{float(i > 50)},0,1" for i in range(100)]
     with pytest.raises(ScenarioError, match=r"line 5\d column px: no smooth curve passes within"):

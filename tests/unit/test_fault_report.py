@@ -164,6 +164,11 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
             "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: node_kill}]}",
             "nothing to fly",
         ),
+        (
+            "{scenario: hover, moments: {a: {at: 3}}, "
+            "faults: [{fault: servo_jam, moments: [{a: 1}]}]}",
+            "moments: a list of a expected",
+        ),
     ],
 )
 def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, message):

@@ -228,6 +228,11 @@ def test_the_command_on_a_device(tmp_path, monkeypatch, capsys):
         assert main(["identify-joint", "alpha_2", *wait, "--out", str(tmp_path / "none")]) == 1
         assert "not confirmed: nothing moved" in capsys.readouterr().out
         out = tmp_path / "out"
+        unwritable = ["--yes", "--out", str(tmp_path / "file" / "out")]
+        (tmp_path / "file").touch()
+        assert main(["identify-joint", "alpha_2", *wait, *unwritable]) == 2
+        assert "cannot be written" in capsys.readouterr().err
+        assert shafts[1].angle == math.pi / 2  # refused before the joint moved
         more = ["--yes", "--load", "0.2", "--duration", "8", "--out", str(out)]
         assert main(["identify-joint", "alpha_2", *wait, *more]) == 0
         assert not any(shaft.last.on for shaft in shafts)

@@ -1,18 +1,21 @@
 """The gains of a log are stored in the columns of the same names."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
 from default_columns import COLUMNS
+from logged_flight import vehicles_log
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import coordinates
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
+from uam_control.vehicle import load_description
 from uam_lab.recording import cdr, log_reader
 from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.logged_topics import ADAPTATION, Log
@@ -20,10 +23,8 @@ from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog
 from uam_lab.recording.message_definitions import schema
 from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import ReferenceWriter
-from uam_msgs_py.messages.convert import JointStateWriter, PoseWriter, SetpointWriter
+from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import expanded
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -83,6 +84,12 @@ def test_a_log_of_two_vehicles_is_refused(tmp_path):
     path = written(tmp_path / "log.mcap", "/uav1/uam/truth/state", "/uav2/uam/truth/state")
     with pytest.raises(UnreadableLog, match="several vehicles: /uav1, /uav2"):
         Log.read(path)
+
+
+def test_a_message_that_is_none_is_refused_in_one_line(tmp_path):
+    log = Log.read(written(tmp_path / "log.mcap", f"/{topics.THRUST.name}"))
+    with pytest.raises(UnreadableLog, match=f"message of {topics.THRUST.name} is damaged"):
+        log.blocks(topics.THRUST)
 
 
 SECOND = 1_000_000_000
@@ -156,47 +163,6 @@ def test_transitions_are_reported_with_mission_time_and_cause():
     ]
 
 
-def vehicles_log(tmp_path):
-    """A log of 3 s: the vehicle stands, then hovers 1 cm above its reference."""
-    names = list(coordinates(2))
-    state, reference = TrajectoryWriter(names), ReferenceWriter(2)
-    chi, desired = np.zeros((3, 8)), np.zeros((3, 8))
-    chi[0, 2], desired[0, 2] = 1.01, 1.0
-    setpoint = SetpointWriter("base_link")
-    payload = PoseWriter()
-    log = BoundedLog(tmp_path / "log.mcap", 0.0)
-    kinds = {
-        topics.STATE: "trajectory_msgs/msg/JointTrajectory",
-        topics.REFERENCE: "trajectory_msgs/msg/JointTrajectory",
-        topics.SETPOINT: "geometry_msgs/msg/TwistStamped",
-        topics.PAYLOAD: "geometry_msgs/msg/PoseStamped",
-        topics.MISSION_STATUS: "diagnostic_msgs/msg/DiagnosticArray",
-    }
-    channels = {
-        topic: log.add_channel(f"/{topic.name}", kind, schema(kind), {})
-        for topic, kind in kinds.items()
-    }
-    begun = 1_700_000_000 * SECOND
-
-    def write(topic, stamp, message, late=0):
-        log.write(channels[topic], stamp, stamp + late, bytes(message), 0)
-
-    for k in range(750):
-        stamp = begun + k * 4_000_000
-        since = max(0, k - 250) * 4_000_000
-        write(topics.REFERENCE, stamp, bytes(reference.fill(stamp, desired, k >= 250, since)))
-        write(topics.STATE, stamp, bytes(state.fill(stamp, chi)))
-        late = 20_000_000 if k % 100 == 0 else 3_000_000
-        write(topics.SETPOINT, stamp, bytes(setpoint.fill(stamp, np.zeros(3), 0.5)), late)
-        write(topics.PAYLOAD, stamp, bytes(payload.fill(stamp, np.array([1.0, 2.0, 0.1]), LEVEL)))
-    for k, magnet in ((0, False), (500, True)):
-        stamp = begun + k * 4_000_000
-        message = MissionStatus("hover", magnet=magnet).to_message(stamp)
-        write(topics.MISSION_STATUS, stamp, serialize_message(message))
-    log.close()
-    return tmp_path / "log.mcap"
-
-
 def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     flight = log_reader.read_flight(vehicles_log(tmp_path), load_scenario("hover"))
     series = flight.series
@@ -210,6 +176,12 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     np.testing.assert_array_equal(series["magnet.on"][[0, 499, 500]], [0.0, 0.0, 1.0])
     assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed == 8
     assert flight.wall_s == pytest.approx(2.996)
+
+
+def test_a_tick_is_missed_after_three_control_periods_of_the_vehicle(tmp_path):
+    slower = replace(load_description(), control_period=0.008)
+    flight = log_reader.read_flight(vehicles_log(tmp_path), load_scenario("hover"), vehicle=slower)
+    assert max(flight.latency_s) == pytest.approx(0.02) and flight.missed == 0
 
 
 class SetpointsOnly:

@@ -10,6 +10,7 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import low_pass_step
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
+from uam_lab.cli.main import main
 from uam_lab.cli.margins import verdict
 from uam_lab.margins.linear import IN, LinearBlock, delay, join, linearise
 from uam_lab.margins.loops import analyse, step_response
@@ -62,7 +63,7 @@ def test_two_loops_that_are_delayed_together():
     assert common_delay(OMEGA, turned) == pytest.approx(expected, rel=1e-3)
 
 
-def test_join_closes_and_opens_a_loop():
+def test_join_closes_a_loop():
     """x+ = x + u, u = -k x one tick later: z^2 - z + k = 0."""
     k = 0.2
     one = np.ones((1, 1))
@@ -74,10 +75,8 @@ def test_join_closes_and_opens_a_loop():
     closed = join(blocks, added=["u"])
     assert closed.inputs == (IN + "u",)
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(closed.a)), np.sort(np.roots([1, -1, k])))
-    opened = join(blocks, opened=["u"]).only([IN + "u"], ["u"])
     z = np.exp(1j * np.array([0.1, 0.5, 2.0]))
-    np.testing.assert_allclose(opened.response(z)[:, 0, 0], -k / (z * (z - 1.0)))
-    # and the closed loop has the sensitivity of the open one
+    # the response of the open one with its sensitivity
     through = closed.only([IN + "u"], ["u"]).response(z)[:, 0, 0]
     np.testing.assert_allclose(through, -k / (z * (z - 1.0)) / (1.0 + k / (z * (z - 1.0))))
     with pytest.raises(ValueError, match="two outputs"):
@@ -246,6 +245,13 @@ def test_a_prediction_gives_roll_and_pitch_phase_and_leaves_yaw(vehicle):
     for name in ("roll", "pitch"):
         assert 10.0 < after.loops[name][1].phase - before.loops[name][1].phase < 20.0
     assert after.loops["yaw"][1].delay == pytest.approx(before.loops["yaw"][1].delay, abs=5e-4)
+
+
+def test_an_unwritable_folder_is_refused_before_the_flight(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("uam_lab.margins.gains.fly", lambda *_: pytest.fail("flown"))
+    (tmp_path / "file").touch()
+    assert main(["margins", "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
 
 
 def test_the_margin_of_the_profile_is_judged():

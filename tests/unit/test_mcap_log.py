@@ -5,7 +5,13 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from uam_lab.recording.bounded_log import BoundedLog
-from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log, read_metadata
+from uam_lab.recording.mcap_reader import (
+    HEADER,
+    TopicLog,
+    UnreadableLog,
+    read_log,
+    read_metadata,
+)
 from uam_lab.recording.message_definitions import schema
 
 rclpy_serialization = pytest.importorskip("rclpy.serialization")
@@ -93,6 +99,29 @@ def test_a_log_cut_off_anywhere_is_read_up_to_there(tmp_path):
         found = len(read_log(cut)["/uam/state"].times)
         assert 2 * chunks <= found <= 2 * min(chunks + 1, 3)
         assert read_metadata(cut) == {"flight": {"seed": "3"}}
+
+
+def test_a_damaged_chunk_is_left_out_and_said(tmp_path):
+    file = tmp_path / "log.mcap"
+    log, lengths = filled(file, 3, size=100)
+    log.close()
+    whole, said = file.read_bytes(), []
+    times = [k * SECOND for k in range(300)]
+    assert read_log(file, note=said.append)["/uam/state"].times == times and not said
+    _, length = HEADER.unpack_from(whole, lengths[0])
+    begin = lengths[0] + HEADER.size
+    for at in range(begin + 24, begin + length, length // 40):  # behind times and size
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        said.clear()
+        found = read_log(file, note=said.append)["/uam/state"].times
+        assert found == times[:100] + times[200:], at
+        assert said == [
+            "log.mcap is damaged: 1 of its records cannot be read, their messages are missing"
+        ]
+    first = whole[: lengths[0] // 2] + b"\0" + whole[lengths[0] // 2 + 1 :]  # with the channels
+    file.write_bytes(first)
+    with pytest.raises(UnreadableLog, match="log.mcap is damaged: 1 of its records"):
+        read_log(file)
 
 
 def test_an_empty_log_opens(tmp_path):

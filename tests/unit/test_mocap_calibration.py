@@ -162,6 +162,7 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
+        ("t,x,y,\xff\n", "not a text in UTF-8"),
         ("t,x,y\n1,2,3\n", "no column z, qw, qx, qy, qz"),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,1,0,0,zero\n", "line 2: not a number"),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,0,0,0,0\n", "line 2: not a pose"),
@@ -170,7 +171,7 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
 )
 def test_a_recording_that_is_none_is_refused(tmp_path, content, reason):
     file = tmp_path / "raw.csv"
-    file.write_text(content)
+    file.write_bytes(content.encode("latin-1"))
     with pytest.raises(MocapError, match=reason):
         raw_log.read(file)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,16 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from uam_lab.campaign import rehearsed_trial
 from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import LOST, REFUSED, Promise
 from uam_lab.campaign.rehearsed_trial import judged, with_checklist
 from uam_lab.cli.main import main
+from uam_lab.processes.interrupts import INTERRUPTED
+from uam_lab.recording.setpoint_latencies import latencies
 from uam_lab.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
-from uam_lab.rehearsal.rehearsed_outcome import latencies
 from uam_lab.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.results.outcome import Outcome
 from uam_lab.vehicle.lab import LabError
@@ -231,6 +234,45 @@ def test_the_lists_are_done_for_wiring_and_without_a_fault():
     assert with_checklist(cell("wrong_id", "start", REFUSED))
     assert not with_checklist(cell("bus_unplugged", 3.0, "landed"))
     assert with_checklist(Cell("no fault", "", Schedule()))
+
+
+def test_ctrl_c_ends_a_matrix_of_rehearsals_and_the_same_command_continues(
+    tmp_path, monkeypatch, capsys
+):
+    matrix, flown = tmp_path / "mine.yaml", []
+    matrix.write_text(
+        "{scenario: hover, moments: {start: {at: start}}, faults: [{fault: wrong_id},"
+        "{fault: mocap_renamed}]}"
+    )
+
+    def fly(lab, settings, options, observer, stop):
+        flown.append(settings.faults)
+        if len(flown) == 2:
+            stop.repeat()
+        return tmp_path, Outcome(series=None, failure=REFUSAL + "no answer"), None
+
+    monkeypatch.setattr(rehearsed_trial, "fly", fly)
+    out = tmp_path / "out"
+    command = ["faults", "--engine", "rehearsal", "--matrix", str(matrix), "--out", str(out)]
+    assert main(command) == INTERRUPTED and len(flown) == 2
+    assert main(command) == 0 and len(flown) == 4 and flown[1] == flown[2]
+    results = json.loads((out / "faults.json").read_text())
+    assert "lost" not in json.dumps(results["flights"])
+    capsys.readouterr()
+    lab = tmp_path / "lab.yaml"
+    lab.write_text(template())
+    assert main([*command, "--config", str(lab)]) == 2
+    assert "contains flights with other settings" in capsys.readouterr().err
+
+
+def test_a_matrix_of_rehearsals_refuses_what_the_lab_file_has(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    foreign = ["--vehicle", "hexa_arm", "--profile", "s500", "--plant-preset", "calm"]
+    command = ["faults", "--matrix", "cables", "--engine", "rehearsal"]
+    assert main([*command, *foreign, "--effect", "ground_effect"]) == 2
+    out, err = capsys.readouterr()
+    assert "--vehicle, --profile, --plant-preset, --effect: not with --engine rehearsal" in err
+    assert err.count("\n") == 1 and not out and not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

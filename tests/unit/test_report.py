@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from uam_lab.cli.main import main
 from uam_lab.report.build import build_report
 from uam_lab.report.facts import flight_summary
 from uam_lab.report.facts import parameter_table as parameters
@@ -209,6 +210,26 @@ def test_notes_and_changes_of_the_vehicle_are_on_the_page(flight_folder):
     words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "Note: 2 messages lost" in words
     assert "air.wind 2.0, 0.0, 0.0" in words
+
+
+def test_a_missing_info_is_no_error_and_a_damaged_file_is_one_line(
+    flight_folder, monkeypatch, capsys
+):
+    for name in list(figures.FIGURES)[2:]:
+        monkeypatch.delitem(figures.FIGURES, name)
+    command = ["report", str(flight_folder), "--no-pictures"]
+    (flight_folder / "info.json").unlink()
+    assert main(command) == 0
+    capsys.readouterr()
+    file = flight_folder / "metrics.json"
+    for text, complaint in (
+        ("{", "not valid JSON"),
+        ("[]", "a mapping expected"),
+        ('{"controller": "modular", "mission_completed": true, "duration_s": 1}', "rms is missing"),
+    ):
+        file.write_text(text)
+        assert main(command) == 2
+        assert capsys.readouterr().err == f"uam report: {file}: {complaint}\n"
 
 
 def test_outcomes_in_words():

@@ -32,6 +32,29 @@ def test_two_flights_of_one_second_get_two_folders_and_latest_is_the_second(here
     assert os.readlink("results/latest") == "20260301-120005-pick_and_place-modular-2"
 
 
+@pytest.mark.parametrize("logs", [True, False])
+def test_a_refused_flight_leaves_no_folder_and_latest_as_it_was(here, logs):
+    latest = here / "results/latest"
+    for before in (None, "20260301-120005-hover-modular"):
+        refused = ResultFolder.create("circle", "modular", now=NOON)
+        if logs:
+            (refused.path / "logs").mkdir()
+        refused.remove_if_empty()
+        assert not refused.path.exists()
+        assert (os.readlink(latest) if latest.is_symlink() else None) == before
+        flown = ResultFolder.create("hover", "modular", now=NOON)
+        result_folder.write_json(flown.metrics, {})
+    flown.remove_if_empty()
+    assert flown.metrics.exists() and latest.resolve() == flown.path.resolve()
+
+
+def test_latest_of_a_later_flight_stays_when_an_earlier_one_is_refused(here):
+    refused = ResultFolder.create("circle", "modular", now=NOON)
+    later = ResultFolder.create("hover", "modular", now=NOON)
+    refused.remove_if_empty()
+    assert (here / "results/latest").resolve() == later.path.resolve()
+
+
 def test_latest_that_is_a_folder_of_the_user_stays(here, capsys):
     (here / "results/latest").mkdir(parents=True)
     folder = ResultFolder.create("hover", "modular", now=NOON)

@@ -172,8 +172,15 @@ def test_sentences_count_what_adaptation_carries_and_where_it_wins(study):
     ("change", "text"),
     [
         ({"spend": 1.5}, "spend: 1.5 is outside 0 to 1"),
-        ({"rows": {"a": {"law": "pid"}}}, "a: law 'pid'"),
-        ({"rows": {"a": {"law": "modular", "frozen": "half"}}}, "a: frozen 'half'"),
+        ({"spend": "half"}, "spend: a number expected, got 'half'"),
+        ({"rows": {"proposed": None}}, "rows.proposed: a mapping expected, got None"),
+        ({"rows": {"a": {"law": "pid"}}}, "rows.a.law: 'pid'"),
+        ({"rows": {"a": {"law": "modular", "frozen": "half"}}}, "rows.a.frozen: 'half'"),
+        ({"rows": {"a": {"profiles": "s500"}}}, "rows.a.profiles: a list of names expected"),
+        ({"conditions": {"a": {"value": "large"}}}, "conditions.a.value: a number expected"),
+        ({"conditions": {"a": None}}, "conditions.a: a mapping expected"),
+        ({"nominal": {"vehicle": 3}}, "nominal.vehicle: a mapping expected"),
+        ({"ranges": {"modular": [1]}}, "ranges.modular: a mapping expected"),
         ({"extra": 1}, "extra: missing, or no entry of a study"),
     ],
 )

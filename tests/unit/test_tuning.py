@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,8 @@ from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.main import main
-from uam_lab.tuning import convergence, front
+from uam_lab.tuning import convergence, front, search_results
+from uam_lab.tuning.search import Task, evaluated_start, open_study
 from uam_lab.tuning.space import Cost, TuningError, load_space
 
 COST = Cost(
@@ -120,6 +122,25 @@ def test_a_bad_knob_is_refused_by_name(tmp_path, knob, complaint):
         load_space(write(tmp_path, knobs=knobs))
 
 
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"knobs": ["lambda"]}, "knobs[0]: a mapping expected, got 'lambda'"),
+        ({"knobs": [{**SPACE["knobs"][1], "low": "small"}]}, "knobs[0].low: a number expected"),
+        ({"knobs": [{**SPACE["knobs"][0], "entries": ["x"]}]}, "knobs[0].entries: a list of 0, 1"),
+        ({"flights": [{"payload_mass": "heavy", "seed": 1}]}, "flights[0].payload_mass: a number"),
+        ({"flights": [{"payload_mass": 0.1, "seed": 1, "wind": 3}]}, "flights[0].wind: unknown"),
+        ({"cost": {**SPACE["cost"], "aim": [1.0]}}, "cost.aim: a list of 8 numbers expected"),
+        ({"cost": None}, "cost: a mapping expected, got None"),
+        ({"delay_margin": 0.05}, "delay_margin: a mapping expected, got 0.05"),
+    ],
+)
+def test_a_bad_space_is_refused_in_one_line(tmp_path, changes, complaint):
+    with pytest.raises(TuningError, match=re.escape(complaint)) as error:
+        load_space(write(tmp_path, **changes))
+    assert "\n" not in str(error.value)
+
+
 def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys):
     space, out = write(tmp_path), tmp_path / "out"
     arguments = ["tune", "--space", space, "--jobs", "1", "--out", str(out)]
@@ -133,6 +154,32 @@ def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys
     best = load_profile(str(out / "best.yaml"))
     assert best.sets["arm_controller"].varpi > 0.0
     assert (out / "search.png").stat().st_size > 0
+
+
+def test_a_start_whose_evaluation_was_killed_is_evaluated_again(tmp_path, capsys):
+    file, out = write(tmp_path), tmp_path / "out"
+    out.mkdir()
+    space = load_space(file)
+    task = Task(space, space.name, str(out / "study.journal"), 1, 1)
+    study = open_study(task)
+    study.enqueue_trial(space.start_values)
+    study.ask()  # stays running, as that of a killed worker
+    assert evaluated_start(space, study) is None
+    assert search_results.in_words(None) == "not evaluated"
+    arguments = ["tune", "--space", file, "--jobs", "1", "--out", str(out), "--evaluations", "1"]
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    start = evaluated_start(space, open_study(task))
+    assert start.number == 1
+    assert f"start: {search_results.in_words(start)}" in said
+    # other inputs give other costs: they do not continue this study
+    for changes in (
+        ["--plant-preset", "laboratory"],
+        ["--space", write(tmp_path, flights=[{"payload_mass": 0.1, "seed": 3}])],
+    ):
+        assert main([*arguments, *changes, "--evaluations", "2"]) == 2
+        complaint = capsys.readouterr().err
+        assert "evaluations of another space" in complaint and complaint.count("\n") == 1
 
 
 def trials(*values):
@@ -196,6 +243,7 @@ def test_convergence_by_hand():
     assert convergence.in_words(curve, 2).startswith("converged: the last 2 of 5 evaluations")
     assert convergence.in_words(curve, 4).startswith("not converged: the last 4")
     assert convergence.in_words(curve, 9).startswith("not converged: 5 evaluations")
+    assert convergence.in_words(curve[:1], 0).startswith("not converged")
 
 
 def test_patience_ends_a_search_that_improves_no_more(tmp_path, capsys):

@@ -2,8 +2,10 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -70,6 +72,38 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
         with workers(Workplace(1, "tcp://127.0.0.1:9")):
             pass
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("reply", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-x\r\n"])
+def test_a_port_that_is_not_a_scheduler_s_is_named_in_time(monkeypatch, reply):
+    monkeypatch.setattr(module, "CONNECTING", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(reply)
+                connection.recv(1)  # until the other end closes
+                time.sleep(2.0)
+
+        threading.Thread(target=answer, daemon=True).start()
+        begun, address = time.monotonic(), f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(WorkersError, match=f"scheduler {address}: .*dashboard") as error:
+            with workers(Workplace(1, address)):
+                pass
+    assert "\n" not in str(error.value)
+    assert time.monotonic() - begun < 30.0
+
+
+@pytest.mark.parametrize("error", [OSError(), TypeError("two\nlines"), MemoryError()])
+def test_every_failure_to_connect_is_one_line(monkeypatch, error):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(module, "_LimitedClient", fail)
+    with pytest.raises(WorkersError, match="scheduler tls://nowhere:1: [A-Za-z]+; the address"):
+        with workers(Workplace(1, "tls://nowhere:1")):
+            pass
 
 
 def test_difference_names_the_first_one():

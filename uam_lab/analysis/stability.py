@@ -148,19 +148,13 @@ def rms(values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def analyse(
-    series: Series,
-    sets: dict,
-    vehicle: Vehicle,
-    payload_mass: float,
-    frequency: float = ticks.FREQUENCY,
-) -> Stability | None:
+def analyse(series: Series, sets: dict, vehicle: Vehicle, payload_mass: float) -> Stability | None:
     """Return the analysis of a flight of the modular law.
 
-    sets: the profile's parameter sets by node; payload_mass [kg]; frequency [Hz] of the ticks used.
+    sets: the profile's parameter sets by node; payload_mass [kg].
     Returns None if fewer than ticks.FEWEST airborne ticks have finite adaptation.* columns.
     """
-    rows = ticks.in_the_air(series, frequency)
+    rows = ticks.in_the_air(series)
     if len(rows) < ticks.FEWEST:
         return None
     printed = sets["attitude_controller"].error_rate_form == "printed"

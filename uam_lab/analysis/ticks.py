@@ -17,19 +17,17 @@ NEEDED = ("truth.", "estimate.", "reference.", "tau_", "rotor_")
 FEWEST = 10  # ticks that the analysis needs
 
 
-def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
-    """Return the airborne rows (m,), ascending, thinned to `frequency` [Hz]; may be empty.
+def in_the_air(series: Series) -> np.ndarray:
+    """Return the airborne rows (m,), ascending, thinned to FREQUENCY; may be empty.
 
     Rows on the ground are left out: the paper's model has no ground contact.
     """
     names = ModularLaw.gain_names(AXES)
     gains = [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
-    return airborne(series, frequency, gains)
+    return airborne(series, gains)
 
 
-def airborne(
-    series: Series, frequency: float = FREQUENCY, further: Sequence[np.ndarray] = ()
-) -> np.ndarray:
+def airborne(series: Series, further: Sequence[np.ndarray] = ()) -> np.ndarray:
     """Return the rows of `in_the_air` for any law; further: blocks (ticks, ..) without gaps, too"""
     if len(series) < FEWEST or not series.flown.any():
         return np.zeros(0, dtype=int)
@@ -38,7 +36,7 @@ def airborne(
         [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), *further)]
     )
     rows = np.flatnonzero(flown & complete)
-    return rows[:: max(1, round(1.0 / (frequency * period(series))))]
+    return rows[:: max(1, round(1.0 / (FREQUENCY * period(series))))]
 
 
 def period(series: Series) -> float:

@@ -120,8 +120,10 @@ def _percentile_rows(flights: CampaignTable) -> list[list[str]]:
 
 
 def _with_band(found: tuple[float, float, float], digits: int, unit: str) -> str:
-    """Return a percentile in words; too few flights give no upper end of the band."""
+    """Return a percentile in words; too few flights give no upper end of the band, or nothing."""
     middle, low, high = found
+    if math.isnan(middle):
+        return "unknown"
     end = f"to {high:.{digits}f}" if math.isfinite(high) else "or more"
     return f"{middle:.{digits}f} {unit} ({max(low, 0.0):.{digits}f} {end})"
 

@@ -137,7 +137,8 @@ def _checked(entry: dict[str, Any], where: str, moments: Collection[str]) -> _Ro
         if key in entry:
             raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
     promised, own = entry.pop("promise", None), entry.pop("moments", [])
-    if not isinstance(own, list) or not set(own) <= set(moments):
+    known = tuple(moments)  # what is asked may not be hashable
+    if not isinstance(own, list) or not all(one in known for one in own):
         raise FaultError(f"{where}: moments: a list of {', '.join(moments)} expected, got {own!r}")
     fault = timed({**entry, "at": 0.0}, {}, where).fault
     promise = None if promised is None else read_promise(promised, where)

@@ -1,6 +1,6 @@
 """Flies many trials: on workers, or one after another in this process where they need nodes.
 
-A trial is a `Trial` or contains one as `trial`.
+A trial is a `Trial`, or contains one as `trial`, or has its `engine` and `keep`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from uam_control.settings import configuration
 from uam_lab.campaign.carried import arrived, carried
 from uam_lab.campaign.trial import Trial, measure
 from uam_lab.flight.direct.warm_up import prepare
@@ -24,19 +25,25 @@ from uam_lab.workers.workers import workers
 Progress = Callable[[int, Any], None]
 
 
+def scenario_text(name_or_file: str) -> str:
+    """Return the text of a scenario's file, by which a table of flights knows an edited one.
+
+    Raises ConfigurationError.
+    """
+    return configuration.named("scenarios", name_or_file).read_text()
+
+
 def fly_all(
     trials: Sequence[Any],
     place: Workplace,
-    work: Callable[[Any], Any] = measure,
     progress: Progress = lambda done, result: None,
 ) -> list[Any]:
     """Fly every trial; return the results in the order of the trials.
 
-    work: importable function from trial to result. progress: called with the number of finished
-    flights and the newest result.
+    progress: called with the number of finished flights and the newest result.
     """
     results: list[Any] = [None] * len(trials)
-    for done, (number, result) in enumerate(_flown(trials, place, work), 1):
+    for done, (number, result) in enumerate(_flown(trials, place, measure), 1):
         results[number] = result
         progress(done, result)
     return results
@@ -97,7 +104,7 @@ def _flown(
 ) -> Iterator[tuple[int, Any]]:
     """Yield number and result of each trial."""
     for engine, group in groupby(enumerate(trials), lambda one: _trial(one[1]).engine):
-        if engine == "ros":  # every node is a process already
+        if engine != "direct":  # every node is a process already
             yield from ((number, work(trial)) for number, trial in group)
         else:
             yield from _flown_by_workers(group, place, work)

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 from uam_lab.campaign import fault_trial
 from uam_lab.campaign.fault_matrix import Cell
@@ -19,6 +20,7 @@ from uam_lab.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
 from uam_lab.results.outcome import Outcome
 from uam_lab.vehicle.lab_file import load_lab
 from uam_lab.vehicle.lab_settings import settings_of
+from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.faults.schedule import FROM_START
 
 
@@ -31,10 +33,15 @@ class RehearsedTrial:
     scenario: str
     seed: int
     kept: Path
+    engine: ClassVar[str] = REHEARSAL  # as `flying` asks a Trial
+    keep: ClassVar[None] = None
 
 
 def measure(trial: RehearsedTrial) -> FaultResult:
-    """Rehearse a trial; return its result. Raises ConfigurationError, ScenarioError, LabError."""
+    """Rehearse a trial; return its result. Raises ConfigurationError, ScenarioError, LabError.
+
+    Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
+    """
     cell = trial.cell
     lab = replace(load_lab(trial.lab), scenario=trial.scenario)
     settings = settings_of(lab)
@@ -49,6 +56,8 @@ def measure(trial: RehearsedTrial) -> FaultResult:
         out = Path(folder) / "flight"
         made = replace(settings, out=out, seed=trial.seed, faults=cell.schedule)
         _, outcome, figures = fly(lab, made, options, Observer(), stop)
+        if stop.raised:
+            raise KeyboardInterrupt
         result = judged(cell, outcome, figures)
         if result.kept is False:
             name = f"{cell.fault} {cell.moment}".replace(" ", "_").replace("/", "_")

@@ -112,9 +112,9 @@ def fly(trial: Trial) -> Outcome:
     flight = DirectFlight(
         scenario, trial.profile, vehicle, trial.payload_mass, trial.seed, trial.faults
     )
-    flight.run()
+    recording = flight.run()
     return Outcome(
-        series=flight.recording.series({"controller": trial.label}),
+        series=recording.series({"controller": trial.label}) if recording.count else None,
         abort_reason=flight.mission.output.abort_reason,
         failure=flight.ended_by,
         transitions=transitions(flight.mission.changes),
@@ -153,6 +153,20 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
     return outcome
 
 
+def recorded(trial: Trial) -> Outcome:
+    """Fly a trial, as `fly`; return its outcome, which has a series.
+
+    Raises TrialFailed if nothing was recorded, or if a flight with the nodes failed.
+    """
+    outcome = fly(trial)
+    if outcome.series is None or (trial.engine == "ros" and outcome.partial):
+        raise TrialFailed(
+            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
+            f"{outcome.reason or 'nothing was recorded'}"
+        )
+    return outcome
+
+
 def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, Any]:
     """Return the content of metrics.json for a flight with a recorded series."""
     scenario = trial.load_scenario()
@@ -171,15 +185,10 @@ def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, A
 def measure(trial: Trial) -> TrialResult:
     """Fly a trial; return its result and write its series to `trial.keep` if given.
 
-    Raises TrialFailed if a flight with the nodes failed.
+    Raises TrialFailed as `recorded`.
     """
-    outcome = fly(trial)
+    outcome = recorded(trial)
     series = outcome.series
-    if series is None or (trial.engine == "ros" and outcome.partial):
-        raise TrialFailed(
-            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
-            f"{outcome.reason or 'nothing was recorded'}"
-        )
     if trial.keep is not None:
         series.write(trial.keep)
     figures = figures_of(trial, outcome, outcome.abort_reason)

@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from uam_control.profiles.profile import Profile
-from uam_control.settings import yaml_file
 from uam_control.settings.configuration import path
+from uam_control.settings.section import read_section
 from uam_lab.campaign.trial import Trial
+from uam_lab.flight.flight_settings import LAST_SEED
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 
 NAMES = ("payload", "payload_offset", "wind", "gust", "noise", "mass", "inertia", "efficiency")
+FACTORS = ("mass", "inertia", "efficiency")  # of which 0 leaves no vehicle that flies
 PER_SEED = 100_000  # numbers of flights apart from each other: seed of flight i is seed * this + i
 DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  # optional, [s]
 
@@ -36,19 +38,23 @@ class Draw:
 def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
     """Return lowest and highest value of each variation; default: campaign/robustness.yaml.
 
-    Raises VariationError if an entry is missing, unknown or no pair of numbers.
+    Raises VariationError if an entry is missing, unknown, or no pair of increasing numbers that
+    are not below 0.
     """
     file = file or path("campaign/robustness.yaml")
-    document = yaml_file.read(file, VariationError)
+    top = read_section(file, VariationError)
     known = set(NAMES) | set(DELAYS)
-    if not isinstance(document, dict) or not set(NAMES) <= set(document) <= known:
+    if not set(NAMES) <= set(top.values) <= known:
         raise VariationError(
             f"{file}: expected are {', '.join(NAMES)} and, if wanted, {', '.join(DELAYS)}"
         )
-    try:
-        return {name: (float(low), float(high)) for name, (low, high) in document.items()}
-    except (TypeError, ValueError):
-        raise VariationError(f"{file}: [least, largest] expected for each entry") from None
+    found = {}
+    for name in top.values:
+        found[name] = low, high = top.numbers(name, 2)
+        if not 0.0 <= low <= high or (name in FACTORS and low == 0.0):
+            above = "above 0" if name in FACTORS else "0 or more"
+            raise top.error(name, f"[least, largest] expected, {above}: [{low:g}, {high:g}]")
+    return found
 
 
 @dataclass(frozen=True)
@@ -65,6 +71,14 @@ class Draws(Sequence[Draw]):
     ranges: dict[str, tuple[float, float]]
     scenario: str = "pick_and_place"
     effects: Effects = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raise VariationError if a flight's seed would be too large."""
+        if self.seed * PER_SEED + self.total - 1 > LAST_SEED:
+            most = (LAST_SEED + 1 - self.total) // PER_SEED
+            raise VariationError(
+                f"seed {self.seed}: with {self.total} flights 0 to {most} are allowed"
+            )
 
     def __len__(self) -> int:
         """Return the number of flights."""

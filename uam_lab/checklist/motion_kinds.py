@@ -52,9 +52,8 @@ class Turn:
 
     labels, unit = AXES, "rad"
 
-    def __init__(self, axis: int, limits: MotionLimits, rates: bool = True) -> None:
-        """rates: body rates are commanded meanwhile."""
-        self._axis, self._limits, self._rates = axis, limits, rates
+    def __init__(self, axis: int, limits: MotionLimits) -> None:
+        self._axis, self._limits = axis, limits
 
     def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
         """Return the turn (3,) [rad] about roll, pitch and yaw axis since `begin`."""
@@ -75,8 +74,6 @@ class Turn:
         turned = rotation_vector(left.gyro, kept.gyro)
         turn = rotation_vector(left.attitude, kept.attitude)
         yield self._agreement("gyro", turned, turn, float(np.linalg.norm(turn)))
-        if not self._rates:
-            return
         against = -sign * kept.commanded[axis]
         others = float(np.max(np.abs(np.delete(kept.commanded, axis))))
         yield Finding(

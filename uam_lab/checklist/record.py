@@ -10,8 +10,6 @@ from uam_lab.checklist.checklist import AUTOMATIC, GUIDED, Checklist
 from uam_lab.checklist.limits import ChecklistParameters
 from uam_lab.checklist.step import StepState
 
-RECORD_FILE = "checklist.json"
-
 
 def record(
     checklist: Checklist, limits: ChecklistParameters, clock_offset: float

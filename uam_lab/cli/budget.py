@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 from uam_control.mission import load_scenario
+from uam_lab.budget.path import NoTicks
 from uam_lab.budget.shuttle import JOINTS, shuttle
 from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.flight import flight_settings
@@ -90,12 +92,13 @@ def run(options: argparse.Namespace) -> int:
             flight = replace(settings, out=out / layout, fused=layout == flown.FUSED)
             try:
                 budgets.append(flown.fly(layout, flight, progress, stop))
-            except FlightFailed as error:
-                print(f"uam budget: {layout}: {error}")
+            except (FlightFailed, NoTicks, OSError) as error:
+                print(f"uam budget: {layout}: {error}", file=sys.stderr)
         if stop.raised:
-            return INTERRUPTED
+            break
+    status = INTERRUPTED if stop.raised else NOT_COMPLETED
     if not budgets:
-        return NOT_COMPLETED
+        return status
     facts = {
         "command": command_line(),
         "made": time.strftime("%Y-%m-%dT%H:%M:%S"),
@@ -107,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
     print(report.summary(budgets))
     print(f"results  {out}")
     whole = len(budgets) == len(layouts) and not any(one.failure for one in budgets)
-    return MEASURED if whole else NOT_COMPLETED
+    return MEASURED if whole and not stop.raised else status
 
 
 def _to_and_fro(settings: FlightSettings, out: Path, options: argparse.Namespace) -> FlightSettings:

@@ -75,7 +75,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     text = "pivot of the rigid body from base_link, forward and left"
     place = number("distance", "m", -0.5, 0.5)
     command.option("--pivot", ("X", "Y"), text, [0.0, 0.0], type=place, nargs=2)
-    command.vehicle(None)
+    command.vehicle("the lab file's")
     text = "base_link above the floor (default: from the vehicle's model)"
     command.option("--height", "M", text, type=number("height", "m", 0.0, 2.0))
     text = "duration of a measurement"

@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         return _replay(draws[numbers[0]].trial, numbers[0], options.out)
 
     from uam_lab.campaign import campaign_report, trial_rows
-    from uam_lab.campaign.flying import fly_into
+    from uam_lab.campaign.flying import fly_into, scenario_text
     from uam_lab.results.row_table import RowTable
 
     out = make_folder(options.out, "campaign")
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     flown = RowTable(
         out / TABLE,
         trial_rows.schema(len(vehicle.joints), draws.names),
-        (*settings, vehicle.numbers, _content(options.scenario), effects),
+        (*settings, vehicle.numbers, scenario_text(options.scenario), effects),
     )
     before = sum(number in flown.keys for number in numbers)
     if before:
@@ -112,11 +112,6 @@ def run(options: argparse.Namespace) -> int:
     print(campaign_report.write(out, table, vehicle.name, command_line(), _again(options)))
     print(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
-
-
-def _content(scenario: str) -> str:
-    """Return what identifies a scenario: its name, or the content of its file."""
-    return Path(scenario).read_text() if Path(scenario).is_file() else scenario
 
 
 def _replay(trial: Trial, number: int, out: Path | None) -> int:

@@ -17,7 +17,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.campaign.trial import TrialFailed
 from uam_lab.campaign.variations import VariationError
-from uam_lab.flight.flight_settings import SettingsError
+from uam_lab.flight.flight_settings import LAST_SEED, SettingsError
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
 from uam_lab.results.row_table import RowTableError
@@ -39,6 +39,7 @@ from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
 WRONG_USE = 2  # exit status
+DEFAULT_SCENARIO = "pick_and_place"
 # the text of each is one line for the user
 USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
@@ -93,13 +94,17 @@ class Command:
         """Add an option whose value is one of `choices`."""
         self.option(flag, "|".join(choices), text, default, choices=choices)
 
-    def vehicle(self, default: str | None = DEFAULT_VEHICLE) -> None:
-        """Add --vehicle; default None: the lab file's."""
+    def vehicle(self, others: str = "") -> None:
+        """Add --vehicle; others: who else names one, "the lab file's", None is the default then."""
         vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
         text = f"{vehicles}, or the description of one: docs/your_vehicle.md"
-        if default is None:
-            text += f" (default: the lab file's, {DEFAULT_VEHICLE} without)"
-        self.option("--vehicle", "NAME|FILE", text, default)
+        self._unless("--vehicle", text, DEFAULT_VEHICLE, others)
+
+    def _unless(self, flag: str, text: str, default: str, others: str) -> None:
+        """Add an option for a name or file whose default is that of others, if they have one."""
+        if others:
+            text += f" (default: {others}, {default} without)"
+        self.option(flag, "NAME|FILE", text, None if others else default)
 
     def config(self, default: str | None = None) -> None:
         """Add --config, the lab file."""
@@ -115,10 +120,10 @@ class Command:
         wait = number("time", "s", 0.0005, 5.0)
         self.option("--answer-timeout", "S", text, 0.05, type=wait)
 
-    def scenario(self) -> None:
-        """Add --scenario."""
+    def scenario(self, others: str = "") -> None:
+        """Add --scenario; others: as in `vehicle`."""
         text = f"{', '.join(configuration.names('scenarios'))}, or a .yaml or .csv file"
-        self.option("--scenario", "NAME|FILE", text, "pick_and_place")
+        self._unless("--scenario", text, DEFAULT_SCENARIO, others)
 
     def profile(self) -> None:
         """Add --profile, for `given_profile`."""
@@ -156,7 +161,7 @@ class Command:
     def process(self) -> None:
         """Add the options of the processes of the nodes that fly, for `chosen_process`."""
         text = (
-            "real-time priority of the nodes that fly, in lockstep of plant and autopilot, too: "
+            "real-time priority of the nodes that fly; in lockstep also of plant and autopilot: "
             "SCHED_FIFO 1..98 (default: ordinary)"
         )
         self.option("--fifo", "PRIORITY", text, type=int, dest="fifo_priority")
@@ -223,6 +228,13 @@ def chosen_process(given: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in chosen.items() if value not in (None, False)}
 
 
+def refuse_given(why: str, **options: Any) -> None:
+    """Raise SettingsError for the options that have a value: name → value."""
+    given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value]
+    if given:
+        raise SettingsError(f"{', '.join(given)}: {why}")
+
+
 def place_of(options: argparse.Namespace) -> Workplace:
     """Return where the work is done: --jobs or --scheduler.
 
@@ -245,8 +257,10 @@ def count(text: str) -> int:
 
 def seed(text: str) -> int:
     """Return the seed in `text`."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a seed: a whole number, 0 or more")
+    if not text.isdecimal() or int(text) > LAST_SEED:
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a seed: a whole number from 0 to {LAST_SEED}"
+        )
     return int(text)
 
 

@@ -9,14 +9,22 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli import study
-from uam_lab.cli.command import Command, chosen_effects, count, number, place_of
+from uam_lab.cli.command import (
+    DEFAULT_SCENARIO,
+    Command,
+    chosen_effects,
+    count,
+    number,
+    place_of,
+    refuse_given,
+)
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import ENGINES, SettingsError, require_ros
+from uam_lab.flight.flight_settings import ENGINES, require_ros
 from uam_lab.results.result_folder import make_folder
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
@@ -50,8 +58,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         "three tables and five figures.",
         EXAMPLES,
     )
-    command.vehicle()
-    command.scenario()
+    command.vehicle("the study's")
+    command.scenario("the study's")
     command.option("--seeds", "N", "seeds 1..N (default 5; with --study the study's)", type=count)
     mass = number("mass", "kg", 0.0, PAYLOAD_MAX)
     text = f"payloads (default {' '.join(map(str, plan.PAYLOADS))})"
@@ -86,19 +94,35 @@ def _further(text: str, vehicle: VehicleDescription) -> plan.ComparedController:
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
     if options.study:
+        refuse_given(
+            "not with --study, which has its own",
+            vehicle=options.vehicle,
+            scenario=options.scenario,
+            payload_mass=options.payload_mass,
+            rows=options.rows,
+            profile=options.profile,
+            plant_preset=options.plant_preset,
+            effect=options.effects,
+        )
         return study.run(options)
-    if options.part or options.condition or options.design or options.tune:
-        raise SettingsError("--part, --condition, --design, --tune: only with --study")
+    refuse_given(
+        "only with --study",
+        part=options.part,
+        condition=options.condition,
+        design=options.design,
+        tune=options.tune,
+    )
     from uam_lab.campaign import trial_rows
-    from uam_lab.campaign.flying import fly_missing
+    from uam_lab.campaign.flying import fly_missing, scenario_text
     from uam_lab.compare import comparison_report, modularity
     from uam_lab.results.row_table import RowTable
 
     if options.engine == "ros":
         require_ros()
     place, payloads = place_of(options), tuple(options.payload_mass or plan.PAYLOADS)
-    vehicle = load_description(options.vehicle)
-    load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
+    vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
+    scenario = options.scenario or DEFAULT_SCENARIO
+    load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
     rows = (
         *plan.entries(options.rows or tuple(plan.ROWS), vehicle),
         *(_further(text, vehicle) for text in options.profile),
@@ -107,16 +131,17 @@ def run(options: argparse.Namespace) -> int:
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)
     seeds = tuple(range(1, (options.seeds or SEEDS) + 1))
-    flights = plan.Flights(vehicle, options.scenario, payloads, seeds, options.engine, effects)
+    flights = plan.Flights(vehicle, scenario, payloads, seeds, options.engine, effects)
     trials = plan.trials(rows, flights, out / "flights")
     proposed = default_profile(catalogue.DEFAULT, vehicle)
     kept = out / "flights" / "modularity.parquet"
     # direct engine: these flights compare the laws only, which are the same in both engines
     every = dict(enumerate([*trials, *modularity.trials(proposed, flights, kept)]))
+    profiles = [(row.label, row.profile.sets, row.profile.bridge()) for row in rows]
     flown = RowTable(
         out / "flights.parquet",
         trial_rows.schema(len(vehicle.joints)),
-        ([(row.label, row.profile.sets, row.profile.bridge()) for row in rows], flights),
+        (profiles, flights, scenario_text(scenario)),
     )
     with Counting("compare", len(every)) as counting:
 
@@ -131,7 +156,7 @@ def run(options: argparse.Namespace) -> int:
         "command": command_line(),
         "engine": options.engine,
         "vehicle": vehicle.name,
-        "scenario": options.scenario,
+        "scenario": scenario,
         "payloads_kg": payloads,
         "seeds": seeds,
         "effects": effects,

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.campaign.trial import Trial
-from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
+from uam_lab.cli.command import (
+    Command,
+    chosen_effects,
+    count,
+    given_profile,
+    place_of,
+    refuse_given,
+)
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
-from uam_lab.vehicle.lab_file import TEMPLATE
+from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
+from uam_lab.vehicle.lab_settings import settings_of
 from uam_sim_bridge.faults import fault_catalogue, feasibility
 from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
@@ -60,7 +68,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.repeated("--only", "FAULT", "only this fault of the matrix")
     command.repeated("--moment", "NAME", "only this moment of the matrix")
     command.option("--scenario", "NAME|FILE", "default: that of the matrix")
-    command.vehicle()
+    command.vehicle("the lab file's")
     command.profile()
     command.plant()
     command.choice("--engine", (*ENGINES, REHEARSAL), "direct", "")
@@ -77,92 +85,102 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         print(fault_catalogue.listing())
         return 0
-    from uam_lab.campaign import fault_matrix, fault_rows, fault_trial
-    from uam_lab.campaign.flying import fly_missing
+    from uam_lab.campaign import fault_matrix, fault_report, fault_rows
+    from uam_lab.campaign.flying import fly_missing, scenario_text
     from uam_lab.results.row_table import RowTable
 
     place = place_of(options)
     check_clock(options.engine, options.clock)
     if options.engine != "direct":
         require_ros()
-    vehicle = load_description(options.vehicle)
-    profile = given_profile(options.profile, vehicle)
+    rehearsed = options.engine == REHEARSAL
+    if rehearsed:
+        refuse_given(
+            "not with --engine rehearsal: the lab file has it",
+            vehicle=options.vehicle,
+            profile=options.profile,
+            plant_preset=options.plant_preset,
+            effect=options.effects,
+        )
+        vehicle = load_lab(options.config).vehicle
+    else:
+        vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
     file = configuration.named("campaign", options.matrix)
     given = (options.engine, options.only, options.moment, options.scenario)
     matrix = fault_matrix.read(file, *given, vehicle)
-    mass = load_scenario(matrix.scenario, vehicle).payload_mass
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
-    if options.engine == REHEARSAL:
-        return _rehearse(options, matrix, cells, vehicle)
-    changes = presets.added({}, chosen_effects(options))
-    trials = [
-        fault_trial.FaultTrial(
-            cell,
-            Trial(
-                cell.fault,
-                profile,
-                mass,
-                options.seed,
-                matrix.scenario,
-                vehicle_changes=changes,
-                faults=cell.schedule,
-                engine=options.engine,
-                clock=options.clock,
-            ),
-        )
-        for cell in cells
-    ]
-    out = make_folder(options.out, "faults")
+    prepared = _rehearsals if rehearsed else _flights
+    kind, make, measure, inputs = prepared(options, matrix, vehicle)
+    out = make_folder(options.out, kind)
     settings = (matrix, options.seed, options.repeat, options.engine, options.clock)
     flown = RowTable(
         out / "flights.parquet",
         fault_rows.SCHEMA,
-        (*settings, profile.sets, profile.bridge(), vehicle.numbers, changes),
+        (*settings, scenario_text(matrix.scenario), vehicle.numbers, *inputs),
     )
-    with Counting("faults", len(trials)) as counting:
+    trials = dict(enumerate(make(cell, out) for cell in cells))
+    with Counting(kind, len(trials)) as counting:
 
-        def show(done: int, one: fault_trial.FaultResult) -> None:
+        def show(done: int, one: FaultResult) -> None:
             moment = f", {one.moment}" if one.moment else ""
             counting.show(done, f"{one.fault}{moment}: {one.outcome}")
 
-        rows = fly_missing(
-            flown, dict(enumerate(trials)), place, fault_rows.to_row, fault_trial.measure, show
-        )
+        rows = fly_missing(flown, trials, place, fault_rows.to_row, measure, show)
     results = [fault_rows.from_row(row) for row in rows.values()]
-    return _written(out, matrix, results, vehicle)
-
-
-def _rehearse(
-    options: argparse.Namespace,
-    matrix: Matrix,
-    cells: Sequence[Cell],
-    vehicle: VehicleDescription,
-) -> int:
-    """Rehearse each cell with the lab file, one after the other; return the exit status."""
-    from uam_lab.campaign.rehearsed_trial import RehearsedTrial, measure
-
-    out = make_folder(options.out, "cables")
-    results = []
-    with Counting("cables", len(cells)) as counting:
-        for done, cell in enumerate(cells, 1):
-            trial = RehearsedTrial(
-                cell, options.config, matrix.scenario, options.seed, out / "broken"
-            )
-            results.append(one := measure(trial))
-            moment = f", {one.moment}" if one.moment else ""
-            counting.show(done, f"{one.fault}{moment}: {one.outcome}")
-    return _written(out, matrix, results, vehicle)
-
-
-def _written(
-    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: VehicleDescription
-) -> int:
-    """Write the report; return the exit status."""
-    from uam_lab.campaign import fault_report
-
     summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line())
     print(summary)
     print(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0
+
+
+class _Prepared(NamedTuple):
+    """kind: of the flights; make: a trial from its cell and the result folder; measure: flies it;
+    inputs: of all flights, beside those of every engine."""
+
+    kind: str
+    make: Callable[[Cell, Path], Any]
+    measure: Callable[[Any], FaultResult]
+    inputs: tuple[object, ...]
+
+
+def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription) -> _Prepared:
+    """Prepare the flights of the engines of `uam fly`."""
+    from uam_lab.campaign.fault_trial import FaultTrial, measure
+
+    profile = given_profile(options.profile, vehicle)
+    mass = load_scenario(matrix.scenario, vehicle).payload_mass
+    changes = presets.added({}, chosen_effects(options))
+
+    def make(cell: Cell, out: Path) -> FaultTrial:
+        trial = Trial(
+            cell.fault,
+            profile,
+            mass,
+            options.seed,
+            matrix.scenario,
+            vehicle_changes=changes,
+            faults=cell.schedule,
+            engine=options.engine,
+            clock=options.clock,
+        )
+        return FaultTrial(cell, trial)
+
+    return _Prepared("faults", make, measure, (profile.sets, profile.bridge(), changes))
+
+
+def _rehearsals(
+    options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription
+) -> _Prepared:
+    """Prepare the rehearsals of the lab file."""
+    from uam_lab.campaign.rehearsed_trial import RehearsedTrial, measure
+
+    lab = load_lab(options.config)
+    profile = settings_of(lab).profile
+
+    def make(cell: Cell, out: Path) -> RehearsedTrial:
+        kept = out / "broken"
+        return RehearsedTrial(cell, options.config, matrix.scenario, options.seed, kept)
+
+    return _Prepared("cables", make, measure, (lab, profile.sets, profile.bridge()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from collections.abc import Iterable
 
 from rich.console import Console
 
@@ -16,7 +17,7 @@ from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.flight.progress import Progress
 from uam_lab.library.flight import Engine, Flight
-from uam_lab.library.flight_result import FlightFailed
+from uam_lab.library.flight_result import FlightFailed, FlightResult
 from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.report.page.console import reporting, summary
 from uam_sim_bridge.faults.schedule import late
@@ -220,7 +221,22 @@ def fly(
         flight = Flight.of(settings, progress, stop, engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()
-    result = flight.result
+    return tell(console, settings, flight.result, name, video, report)
+
+
+def tell(
+    console: Console,
+    settings: FlightSettings,
+    result: FlightResult,
+    name: str,
+    video: bool,
+    report: bool,
+    further: Iterable[str] = (),
+) -> int:
+    """Make the report and print the result of a flight; return the exit status.
+
+    name: of the command; further: lines that follow the summary.
+    """
     outcome, metrics = result.outcome, result.metrics
     if metrics is not None:
         if report:
@@ -237,6 +253,8 @@ def fly(
         console.print(summary(metrics, result.folder))
     else:
         print(f"results: {result.folder}")
+    for line in further:
+        print(line)
     for note in outcome.notes:
         print(f"note: {note}")
     if outcome.failure:

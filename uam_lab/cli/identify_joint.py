@@ -59,7 +59,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     mass = number("mass", "kg", 0.0, 5.0)
     command.option("--load", "KG", "mass that hangs at the magnet", 0.0, type=mass)
     command.switch("--yes", "do not ask before the joint moves")
-    command.out()
+    command.out("identify-<joint>")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -94,6 +94,7 @@ def run(options: argparse.Namespace) -> int:
             print("not confirmed: nothing moved")
             return NOT_DONE
         weight = weight_of(options, angles, joint)
+        out = make_folder(options.out, "identify", options.joint)  # before the joint moves
         record = excite(driver, joint, centre, weight, p, pacing(driver.rate))
         loads = np.array([weight(one)[joint] for one in record.position[:, joint]])
         fit = fit_friction(record, joint, loads)
@@ -102,7 +103,6 @@ def run(options: argparse.Namespace) -> int:
         return NOT_DONE
     finally:
         driver.stop()
-    out = make_folder(options.out, "identify", options.joint)
     text = pasted(options.joint, driver.chain.servos[joint].torque_scale, fit)
     (out / "identification.yaml").write_text(text)
     columns = (record.times, record.position[:, joint], record.effort[:, joint], loads)

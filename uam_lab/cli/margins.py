@@ -77,17 +77,15 @@ def run(options: argparse.Namespace) -> int:
     if profile.section("mavlink_bridge").get("setpoint", "rates") != "rates":
         raise SettingsError(f"{profile.name}: margins need body-rate setpoints, setpoint: rates")
     payloads = options.payload or [0.0, 0.2]
+    mass = load_scenario(options.scenario, described).payload_mass
+    series = series_of(options.flight) if options.flight and not options.initial else None
+    out = make_folder(options.out, "margins")  # before the flight, which takes long
     flown = None
     if not options.initial:
-        mass = load_scenario(options.scenario, described).payload_mass
-        series = (
-            series_of(options.flight)
-            if options.flight
-            else gains.fly(profile, vehicle, options.scenario, mass)
-        )
+        if series is None:
+            series = gains.fly(profile, vehicle, options.scenario, mass)
         flown = gains.flown_gains(profile, series)
     ticks = round(1e-3 * options.delay / described.control_period)
-    out = make_folder(options.out, "margins")
     cases = cases_of(profile, vehicle, payloads, flown, options.arm, ticks)
     mocap = described.numbers["sensors"]["mocap"]
     period = described.control_period

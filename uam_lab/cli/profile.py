@@ -48,7 +48,11 @@ def run(options: argparse.Namespace) -> int:
 
 def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
     """Switch the nodes of a vehicle, print the changes; return the exit status."""
-    from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
+    from uam_lab.flight.ros.profile_switch import (
+        ProfileSwitch,
+        SwitchIncomplete,
+        SwitchRefused,
+    )
     from uam_lab.processes.guest import Guest
     from uam_lab.processes.node_environment import transport_environment
 
@@ -57,7 +61,9 @@ def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
         try:
             changed = ProfileSwitch(guest.node).switch(profile)
         except SwitchRefused as refusal:
-            print("uam profile: refused, nothing changed", file=sys.stderr)
+            whole = not isinstance(refusal, SwitchIncomplete)
+            state = "nothing changed" if whole else "but not all nodes have their old values"
+            print(f"uam profile: refused, {state}", file=sys.stderr)
             for line in str(refusal).splitlines():
                 print(f"  {line}", file=sys.stderr)
             return REFUSED

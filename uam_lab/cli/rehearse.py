@@ -9,12 +9,12 @@ from dataclasses import replace
 from rich.console import Console
 
 from uam_lab.cli.command import Command, chosen_effects, number
-from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED
+from uam_lab.cli.fly import tell
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import require_ros
 from uam_lab.flight.progress import Progress
-from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
-from uam_lab.report.page.console import reporting, summary
+from uam_lab.library.flight_result import FlightResult
+from uam_lab.processes.interrupts import Interrupts
 from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.vehicle.lab_settings import settings_of
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
@@ -127,27 +127,6 @@ def run(options: argparse.Namespace) -> int:
     landing = settings.scenario.landing
     with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
         folder, outcome, metrics = fly(lab, settings, rehearsal, progress, stop)
-    if metrics is not None:
-        if options.report:
-            from uam_lab.report.build import build_report
-
-            with reporting(console) as show:
-                pictures = not outcome.interrupted
-                made = build_report(folder, show, video=options.video, pictures=pictures)
-            if made.problem:
-                outcome.notes.append(made.problem)
-        console.print(summary(metrics, folder))
-    else:
-        print(f"results: {folder}")
-    for line in device_figures.lines(device_figures.saved(folder)):
-        print(line)
-    for note in outcome.notes:
-        print(f"note: {note}")
-    if outcome.failure:
-        print(f"uam rehearse: {outcome.failure}")
-        for line in outcome.details:
-            print(f"  | {line}")
-    if outcome.interrupted:
-        return INTERRUPTED
-    completed = metrics is not None and metrics["mission_completed"] and not outcome.failure
-    return COMPLETED if completed else NOT_COMPLETED
+    result = FlightResult(folder, metrics, outcome)
+    further = device_figures.lines(device_figures.saved(folder))
+    return tell(console, settings, result, "rehearse", options.video, options.report, further)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.console import Console
 
 from uam_lab.cli.command import Command
 from uam_lab.flight.flight_settings import require_ros
-from uam_lab.results.result_folder import ResultFolderError, make_folder
+from uam_lab.results.result_folder import ResultFolderError, make_folder, read_json
 
 WRITTEN = 0
+# of metrics.json, without which there is no summary
+SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
 EXAMPLES = """\
 examples:
   uam report results/latest                rebuild everything from its log.mcap, also after a flight
@@ -58,7 +59,9 @@ def one(options: argparse.Namespace) -> int:
         require_ros()
         metrics = rebuild(directory, out, options.scenario)
     elif options.out is None and (directory / "metrics.json").exists():  # of the direct engine
-        metrics = json.loads((directory / "metrics.json").read_text())
+        metrics = read_json(directory / "metrics.json")
+        if missing := [name for name in SHOWN if name not in metrics]:
+            raise ResultFolderError(f"{directory / 'metrics.json'}: {missing[0]} is missing")
     else:
         raise ResultFolderError(f"{directory} has no {LOG} for a report")
     console = Console()
@@ -92,4 +95,5 @@ def several(options: argparse.Namespace) -> int:
 
 
 def _notes(directory: Path) -> list[str]:
-    return json.loads((directory / "info.json").read_text()).get("notes") or []
+    file = directory / "info.json"
+    return read_json(file).get("notes") or [] if file.exists() else []

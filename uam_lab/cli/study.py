@@ -15,7 +15,7 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import SettingsError, require_ros
 from uam_lab.results.atomic import write_rows, write_text
-from uam_lab.results.result_folder import make_folder, versions, write_json
+from uam_lab.results.result_folder import make_folder, read_json, versions, write_json
 from uam_lab.study.description import Study, load_study
 from uam_lab.study.flights import StudyFlight, StudyResult
 from uam_lab.workers.place import Workplace
@@ -65,7 +65,7 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
     from uam_lab.tuning.convergence import in_words as convergence
 
     file = out / TUNING
-    done = json.loads(file.read_text()) if file.exists() else {}
+    done = read_json(file) if file.exists() else {}
     for law in study.document["ranges"]:
         if len(done.get(law, {}).get("costs", ())) == evaluations:
             continue  # of a search that was stopped

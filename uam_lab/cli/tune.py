@@ -84,7 +84,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Search, show the progress, write the results; return the exit status."""
     from uam_lab.tuning import search_results
-    from uam_lab.tuning.search import Task, curve, open_study, search
+    from uam_lab.tuning.search import DONE, Task, curve, evaluated_start, open_study, search
 
     vehicle = load_description(options.vehicle)
     start = given_profile(options.profile, vehicle) if options.profile else None
@@ -126,15 +126,16 @@ def run(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     study = open_study(task)
-    if not any(trial.values for trial in study.trials):
+    if not study.get_trials(deepcopy=False, states=DONE):
         return status or 1
     search_results.write_best(out / "best.yaml", space, study, command_line())
     search_results.write_evaluations(out / "evaluations.csv", space, study)
     search_results.plot(out / "search.png", space, study)
     best, told = search_results.best_of(space, study), search_results.in_words
-    print(f"best      evaluation {best.number}, {told(best)}; start: {told(study.trials[0])}")
+    begun = told(evaluated_start(space, study))
+    print(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
     values = curve(study)
-    print(f"search    {convergence(values, options.patience or len(values) // 2)}")
+    print(f"search    {convergence(values, options.patience or max(1, len(values) // 2))}")
     print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     print(f"plot      {out / 'search.png'}")
     return status

@@ -19,7 +19,7 @@ from uam_lab.results import templates, timeseries
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import versions, write_json
 
-# The paper's five figures; OVERLAID: the rows drawn in them.
+# The paper's five figures; OVERLAID: the rows drawn in them, if they are flown.
 PAPERS_FIGURES = (
     "position_errors",
     "attitude_errors",
@@ -101,9 +101,12 @@ def write(
         "interval over seeds.\n",
     )
     page = out / "report.html"
+    kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
+    shown = [label for label in OVERLAID if label in kept] or list(kept)[: len(OVERLAID)]
+    flights = [DrawnFlight(label, timeseries.read(kept[label])) for label in shown]
     pictures = [
         (name, templates.embedded(out / "figures" / f"{name}.png"))
-        for name in _draw(out, trials, results, found)
+        for name in _draw(out, flights, results, found)
     ]
     text = templates.render(
         "uam_lab.compare",
@@ -114,7 +117,7 @@ def write(
         pictures=pictures,
         facts=facts,
         confidence=tables.CONFIDENCE,
-        shown=OVERLAID,
+        shown=shown,
     )
     write_text(page, text)
     return Written(markdown + "\n" + "\n".join(claims) + "\n", page)
@@ -122,15 +125,11 @@ def write(
 
 def _draw(
     out: Path,
-    trials: Sequence[Trial],
+    flights: Sequence[DrawnFlight],
     results: Sequence[TrialResult],
     found: Sequence[tables.ControllerErrors],
 ) -> list[str]:
-    """Write the figures; return their names."""
-    kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
-    flights = [
-        DrawnFlight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
-    ]
+    """Write the figures, the paper's of `flights`; return their names."""
     drawn = figures.draw(flights, out / "figures", names=PAPERS_FIGURES)
     with style.styled():
         for name, figure in (("rms", _rms(found)), ("gains", _gains(results))):

@@ -22,6 +22,7 @@ from uam_lab.campaign.trial import Trial, TrialResult
 from uam_lab.compare.plan import Flights
 from uam_lab.results import timeseries
 from uam_lab.results.timeseries import Series
+from uam_sim_bridge.plant.effects import presets
 
 SUBSYSTEMS = {
     "position": ("position_controller", PositionController),
@@ -55,7 +56,7 @@ def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile
 
 def trials(profile: Profile, flights: Flights, keep: Path) -> list[Trial]:
     """Return the unchanged flight (its series goes to `keep`) and one per changed subsystem."""
-    shown = (*flights.shown, flights.scenario)
+    shown = (*flights.shown, flights.scenario, presets.added({}, flights.effects))
     return [
         Trial("as it is", profile, *shown, keep=keep),
         *(

@@ -30,12 +30,15 @@ TABLES = (("position", POSITION), ("attitude", ATTITUDE), ("arm", ARM))
 class ControllerErrors:
     """One controller. mean, half_width, worst (6 + n,): RMS errors, m and deg.
 
-    mean: over all flights; half_width: of its confidence interval over seeds (of the means over
-    the payloads), NaN for one seed; worst: largest RMS of any flight.
+    mean: over the flights that took off, NaN without any; half_width: of its confidence interval
+    over their seeds (of the means over the payloads), NaN for one seed; worst: largest RMS of any
+    of them. flown: their number; seeds: that of their seeds.
     """
 
     label: str
     flights: int
+    flown: int
+    seeds: int
     completed: int
     lost: int
     mean: np.ndarray
@@ -52,7 +55,11 @@ class ControllerErrors:
     def shortfall(self) -> str:
         """Text with the number of flights that were not completed, "" without any."""
         short = self.flights - self.completed
-        return f"{short} of {self.flights} not completed" if short else ""
+        if not short:
+            return ""
+        grounded = self.flights - self.flown
+        without = f", {grounded} of them without take-off: no errors" if grounded else ""
+        return f"{short} of {self.flights} not completed{without}"
 
 
 def rows(results: Sequence[TrialResult]) -> list[ControllerErrors]:
@@ -65,14 +72,18 @@ def rows(results: Sequence[TrialResult]) -> list[ControllerErrors]:
 
 def row(label: str, results: Sequence[TrialResult]) -> ControllerErrors:
     """Return the row of these flights; a flight that ended early counts up to its end."""
-    rms = np.array([result.rms for result in results])
+    flown = [result for result in results if np.isfinite(result.rms).all()]
+    counted = flown or results
+    rms = np.array([result.rms for result in counted])
     return ControllerErrors(
         label=label,
         flights=len(results),
+        flown=len(flown),
+        seeds=len({result.seed for result in flown}),
         completed=sum(result.completed for result in results),
         lost=sum(result.lost for result in results),
         mean=rms.mean(axis=0),
-        half_width=half_width(results),
+        half_width=half_width(counted),
         worst=rms.max(axis=0),
         why=tuple(sorted({result.why for result in results if result.why})),
     )
@@ -100,8 +111,11 @@ def claims(found: Sequence[ControllerErrors]) -> list[str]:
     """Return one sentence per claim of the paper: whether it holds in these flights."""
     by_label = {row.label: row for row in found}
     said = []
-    if any(np.isnan(row.half_width).any() for row in found):
+    single = [row.label for row in found if row.seeds == 1]
+    if len(single) == len(found):
         said.append("One seed only: there are no confidence intervals.")
+    elif single:
+        said.append(f"One seed only, without a confidence interval: {', '.join(single)}.")
     for better, worse in ((PROPOSED, ASMC1), (PROPOSED, ASMC2), (ASMC2, ASMC1)):
         if better in by_label and worse in by_label:
             said.append(_smaller(by_label[better], by_label[worse]))
@@ -119,16 +133,20 @@ def claims(found: Sequence[ControllerErrors]) -> list[str]:
 
 def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
     """Return the columns with smaller errors of `better`, beyond the confidence intervals."""
-    apart, near, against = [], [], []
+    apart, near, against, unknown = [], [], [], []
     for i, name in enumerate(better.coordinates):
         margin = np.nan_to_num(better.half_width[i]) + np.nan_to_num(worse.half_width[i])
         gap = worse.mean[i] - better.mean[i]
-        (apart if gap > margin else against if gap < -margin else near).append(name)
+        if np.isnan(gap):
+            unknown.append(name)
+        else:
+            (apart if gap > margin else against if gap < -margin else near).append(name)
     return (
         f"Smaller errors with {better.label} than with {worse.label}: "
         + (f"holds for {', '.join(apart)}" if apart else "holds in no column")
         + (f"; no significant difference for {', '.join(near)}" if near else "")
         + (f"; does not hold for {', '.join(against)}" if against else "")
+        + (f"; unknown for {', '.join(unknown)}" if unknown else "")
         + "."
     )
 
@@ -139,7 +157,13 @@ def _limit(what: str, row: ControllerErrors, limit: Sequence[float]) -> str:
     missed = [name for name, worst, most in judged if not worst <= most]
     return (
         f"Worst RMS of any {row.label} flight against {what}: "
-        + ("met in every column" if not missed else f"missed in {', '.join(missed)}")
+        + (
+            "unknown, none took off"
+            if not row.flown
+            else f"missed in {', '.join(missed)}"
+            if missed
+            else "met in every column"
+        )
         + "."
     )
 
@@ -154,7 +178,8 @@ def error_tables(found: Sequence[ControllerErrors]) -> list[dict[str, Any]]:
         for row in found:
             worse = [""] * len(names)
             if proposed is not None and row is not proposed:
-                worse = [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
+                worse = degradation(row.mean, proposed.mean)[columns]
+                worse = ["" if np.isnan(x) else f"{x:.0f}" for x in worse]
             values = zip(row.mean[columns], row.half_width[columns], strict=True)
             here = [cell(mean, half, digits) for mean, half in values]
             published = papers(row)[columns]
@@ -190,5 +215,7 @@ def _name(row: ControllerErrors) -> str:
 
 
 def cell(mean: float, half: float, digits: int) -> str:
-    """Return a mean with half the width of its confidence interval, if there is one."""
+    """Return a mean with half the width of its confidence interval, if there is one; "-": NaN."""
+    if np.isnan(mean):
+        return "-"
     return f"{mean:.{digits}f}" + ("" if np.isnan(half) else f" ± {half:.{digits}f}")

@@ -56,6 +56,7 @@ REPLACEABLE = (
 )
 COCKPIT = "cockpit"
 LAYOUTS = {False: "separate nodes", True: "fused: control nodes in one process"}
+LAST_SEED = 2**31 - 1
 NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 AUTOPILOT = "autopilot"  # name of its process
@@ -249,8 +250,8 @@ def settings(
         parameters = {**(parameters or {}), **own}
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
-    if not 0 <= seed < 2**31:
-        raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
+    if not 0 <= seed <= LAST_SEED:
+        raise SettingsError(f"seed {seed} is outside 0..{LAST_SEED}")
     described = load_description(str(vehicle))
     options = _scenario_options(
         end=end, transit_speed=transit_speed, transit_acceleration=transit_acceleration

@@ -147,7 +147,7 @@ class Flight:
             self._result = FlightResult(folder.path, metrics, outcome)
         except BaseException as error:  # raised again in the caller's thread
             self._error = error
-            _remove_if_empty(folder.path)
+            folder.remove_if_empty()
         finally:
             if self._clients is not None:
                 self._clients.close()
@@ -425,12 +425,3 @@ def _engine(name: str) -> Engine:
     else:
         from uam_lab.flight.ros.engine import fly as engine
     return engine
-
-
-def _remove_if_empty(folder: Path) -> None:
-    """Remove the empty result folder of a refused flight."""
-    for path in (folder / "logs", folder):
-        try:
-            path.rmdir()
-        except OSError:
-            return

@@ -74,12 +74,9 @@ def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> LinearBl
     return LinearBlock(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
 
 
-def join(
-    blocks: Iterable[LinearBlock], opened: Collection[str] = (), added: Collection[str] = ()
-) -> LinearBlock:
+def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> LinearBlock:
     """Connect each input with the output of the same name; return the whole as a block.
 
-    opened: signals that are cut: the output stays, the inputs of that name get IN + name instead.
     added: signals to which the input IN + name is added. Inputs that no block drives stay inputs.
     Raises ValueError for two outputs of one name.
     """
@@ -89,15 +86,15 @@ def join(
     if len(set(outputs)) < len(outputs):
         raise ValueError(f"two outputs of one name among {outputs}")
     free = [name for name in dict.fromkeys(inputs) if name not in outputs]
-    free += [IN + name for name in (*opened, *added)]
+    free += [IN + name for name in added]
     feedback = np.zeros((len(inputs), len(outputs)))
     outside = np.zeros((len(inputs), len(free)))
     for row, name in enumerate(inputs):
-        if name in opened or name in added:
+        if name in added:
             outside[row, free.index(IN + name)] = 1.0
         elif name not in outputs:
             outside[row, free.index(name)] = 1.0
-        if name in outputs and name not in opened:
+        if name in outputs:
             feedback[row, outputs.index(name)] = 1.0
     a, b, c, d = (_diagonal([getattr(block, part) for block in blocks]) for part in "abcd")
     loop = np.linalg.inv(np.eye(len(inputs)) - feedback @ d)

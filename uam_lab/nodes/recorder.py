@@ -142,6 +142,29 @@ def _open(node: Node, options: RecorderParameters, rightful: RightfulNodes) -> T
     return made
 
 
+def _complete(node: Node, recording: TopicRecorder, statistics: str) -> None:
+    """Complete the log, then write the file `statistics`, "" for none; say what cannot be written.
+
+    The disk may be full: the statistics say so even if the bag's metadata found no room.
+    """
+    log = node.get_logger()
+    try:
+        if not recording.close():
+            log.warning(
+                "the folder has the metadata.yaml of another log: give this one's file a name"
+            )
+    except OSError as error:
+        log.error(f"metadata.yaml cannot be written: {error.strerror}")
+    if recording.lost:
+        log.warning(f"messages were lost: {_losses(recording)}")
+    if statistics:
+        summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
+        try:
+            Path(statistics).write_text(json.dumps(summary, indent=1))
+        except OSError as error:
+            log.error(f"{statistics} cannot be written: {error.strerror}")
+
+
 def main() -> int:
     """Record until SIGINT or SIGTERM, then complete the file; return the exit status.
 
@@ -195,13 +218,7 @@ def main() -> int:
                     log.error("; ".join(new))
             health.publish(_health(node, recording, loop, new))
     recording.drain()
-    if not recording.close():
-        log.warning("the folder has the metadata.yaml of another log: give this one's file a name")
-    if recording.lost:
-        log.warning(f"messages were lost: {_losses(recording)}")
-    if options.statistics:
-        summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
-        Path(options.statistics).write_text(json.dumps(summary, indent=1))
+    _complete(node, recording, options.statistics)
     services.shutdown()
     node.destroy_node()
     rclpy.shutdown()

@@ -8,10 +8,9 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages.fault_events import FaultEvent
 from uam_sim_bridge.faults.timeline import record
-
-SECOND = 1e9
 
 
 def records(messages: Iterable[bytes], takeoff: int) -> list[dict[str, Any]]:

@@ -23,10 +23,11 @@ from rclpy.serialization import deserialize_message
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
+from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.recording import fault_records as fault_log
-from uam_lab.recording.logged_topics import ADAPTATION, SECOND, Log, StampedRows
+from uam_lab.recording.logged_topics import ADAPTATION, Log, StampedRows
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results import timeseries
 from uam_lab.results.outcome import Outcome, grasp_decision, transition
@@ -34,9 +35,9 @@ from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series,
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
+from uam_sim_bridge.nodes.latencies import DEADLINE_TICKS
 
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
-MISSED = 0.012  # [s] of a tick on a vehicle: three control periods, as in simulation
 ESTIMATE = "estimate"
 STATE_ROWS = ("positions", "velocities", "accelerations")
 
@@ -130,7 +131,8 @@ def read_flight(
             log.width(topics.TRUTH_STATE) - ALPHA, log.width(topics.TRUTH_ROTORS)
         )
     else:
-        columns = timeseries.columns_of(vehicle or load_description())
+        vehicle = vehicle or load_description()
+        columns = timeseries.columns_of(vehicle)
     states = topics.TRUTH_STATE if simulated else topics.STATE
     references = References(log, columns.size)
     truth = log.samples(states, STATE_ROWS, columns.size)
@@ -143,10 +145,10 @@ def read_flight(
         raise UnreadableLog(f"{path} has no control tick")
     state = log.samples(topics.STATE, STATE_ROWS, columns.size)
     ticks = every[~withheld(log, every, state.stamps, references.samples.stamps)]
-    notes = []
+    notes = [*log.notes]
     if len(ticks) < len(every):
         text = f"table and errors have {len(ticks)} of {len(every)} ticks"
-        notes = [f"{text}: the log has no state and no reference of the others (inner_rate)"]
+        notes.append(f"{text}: the log has no state and no reference of the others (inner_rate)")
     recording = FlightTable(len(ticks), columns)
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
@@ -179,7 +181,10 @@ def read_flight(
     ended = end is not None
     events = changes, entered, decided, faults
     found = LoggedFlight(series, ended, abort_reason, *events, wall, notes)
-    return found if simulated else replace(found, errors_of=ESTIMATE, **latencies(log, ticks))
+    if simulated:
+        return found
+    period = vehicle.control_period
+    return replace(found, errors_of=ESTIMATE, **latencies(log, ticks, period))
 
 
 def withheld(log: Log, ticks: np.ndarray, states: np.ndarray, references: np.ndarray) -> np.ndarray:
@@ -284,17 +289,17 @@ def _measured(
     values[:, columns["magnet.on"]] = StampedRows(stamps, on).at(ticks)[:, 0]
 
 
-def latencies(log: Log, ticks: np.ndarray) -> dict[str, Any]:
+def latencies(log: Log, ticks: np.ndarray, period: float) -> dict[str, Any]:
     """Return `latency_s` (m,): stamp of a tick → its setpoint was published, on the wall clock [s],
-    and `missed`: the ticks without a setpoint within MISSED.
+    and `missed`: the ticks without a setpoint within DEADLINE_TICKS.
 
-    ticks (k,) [ns], of the wall clock.
+    ticks (k,) [ns], of the wall clock; period: of the control ticks [s].
     """
     stamps, published = log.published(topics.SETPOINT)
     found = (published - stamps)[np.isin(stamps, ticks)] / SECOND
     return {
         "latency_s": found.tolist(),
-        "missed": len(ticks) - int(np.count_nonzero(found < MISSED)),
+        "missed": len(ticks) - int(np.count_nonzero(found <= DEADLINE_TICKS * period)),
     }
 
 

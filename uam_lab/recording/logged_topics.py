@@ -10,14 +10,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool
 
+from uam_control.stamps import SECOND
 from uam_lab.recording import cdr
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.namespace import expanded
 
-SECOND = 1e9
 ADAPTATION = {
     "position": topics.POSITION_ADAPTATION,
     "attitude": topics.ATTITUDE_ADAPTATION,
@@ -53,10 +54,13 @@ class StampedRows:
 class Log:
     """The topics of one vehicle in a log, decoded on request.
 
-    found: by name; namespace: of the vehicle's nodes.
+    found: by name; namespace: of the vehicle's nodes; notes: lines about what cannot be read.
     """
 
-    def __init__(self, found: Mapping[str, TopicLog], namespace: str = "/"):
+    def __init__(
+        self, found: Mapping[str, TopicLog], namespace: str = "/", notes: Sequence[str] = ()
+    ):
+        self.notes = notes
         self._topics = {
             topic: found[name]
             for topic in TOPICS
@@ -71,12 +75,13 @@ class Log:
         Raises UnreadableLog, also for a log of several vehicles; OSError.
         """
         ends = tuple(f"/{topic.name}" for topic in TOPICS)
-        found = read_log(path, lambda name: name.endswith(ends))
+        notes: list[str] = []
+        found = read_log(path, lambda name: name.endswith(ends), notes.append)
         states = tuple(f"/{topic.name}" for topic in (topics.TRUTH_STATE, topics.STATE))
         spaces = {name.removesuffix(one) for name in found for one in states if name.endswith(one)}
         if len(spaces) > 1:
             raise UnreadableLog(f"{path} has several vehicles: {', '.join(sorted(spaces))}")
-        return cls(found, spaces.pop() if spaces else "/")
+        return cls(found, spaces.pop() if spaces else "/", notes)
 
     def messages(self, topic: Topic) -> list[bytes]:
         """Return the serialized messages of a topic in file order; may be empty."""
@@ -100,11 +105,17 @@ class Log:
         return np.concatenate([one.stamps for one in blocks]), np.array(log.published)
 
     def blocks(self, topic: Topic) -> list[cdr.Block]:
-        """Return the decoded messages of a topic, decoded once; may be empty."""
+        """Return the decoded messages of a topic, decoded once; may be empty.
+
+        Raises UnreadableLog.
+        """
         made = self._blocks.get(topic)
         if made is None:
             log = self._topics.get(topic)
-            made = cdr.read(log.type_name, log.messages) if log and log.messages else []
+            try:
+                made = cdr.read(log.type_name, log.messages) if log and log.messages else []
+            except BadMessage as error:
+                raise UnreadableLog(f"a message of {topic.name} is damaged: {error}") from None
             self._blocks[topic] = made
         return made
 

@@ -15,11 +15,13 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata, Schema
-from mcap.stream_reader import MAGIC_SIZE, get_chunk_data_stream
+from mcap.stream_reader import MAGIC_SIZE, get_chunk_data_stream, zstandard
 from mcap.writer import MCAP0_MAGIC
 
 HEADER = struct.Struct("<BQ")  # opcode, length of the content [bytes]
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time [ns], publish time [ns]
+# of a record that was cut off or changed; ValueError: a wrong checksum, KeyError: its type is lost
+DAMAGE = (EndOfFile, struct.error, ValueError, KeyError, zstandard.ZstdError)
 
 
 class UnreadableLog(ValueError):
@@ -36,21 +38,32 @@ class TopicLog:
     published: list[int] = field(default_factory=list)
 
 
-def read_log(path: Path, chosen: Callable[[str], bool] = lambda _: True) -> dict[str, TopicLog]:
+def read_log(
+    path: Path,
+    chosen: Callable[[str], bool] = lambda _: True,
+    note: Callable[[str], None] = lambda text: None,
+) -> dict[str, TopicLog]:
     """Return all messages of the topics for whose names `chosen` is true, by topic.
 
-    An incomplete last record is ignored. Raises UnreadableLog, OSError.
+    An incomplete last record is ignored, a damaged one is left out; note: called with a line that
+    says so. Raises UnreadableLog, also if the damage leaves no topic; OSError.
     """
-    topics = _Topics(chosen)
-    try:
-        for opcode, content in _records(path):
+    topics, damaged = _Topics(chosen), 0
+    for opcode, content in _records(path):
+        try:
             if opcode == Opcode.CHUNK:
-                stream, length = get_chunk_data_stream(Chunk.read(_stream(content)))
+                chunk = Chunk.read(_stream(content))
+                stream, length = get_chunk_data_stream(chunk, validate_crc=True)
                 topics.read(stream.read(length))
             else:
                 topics.read_one(opcode, content, 0, len(content))
-    except (EndOfFile, struct.error):  # a damaged record: what was read before it counts
-        pass
+        except DAMAGE:
+            damaged += 1
+    if damaged:
+        text = f"{path.name} is damaged: {damaged} of its records cannot be read"
+        if not topics.found:
+            raise UnreadableLog(f"{path}: {text}")
+        note(f"{text}, their messages are missing")
     return topics.found
 
 

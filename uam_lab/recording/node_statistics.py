@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 RECORDER = "recorder.json"
+LABORATORY_FILE = "laboratory.json"
 
 
 def statistics(file: Path) -> dict[str, Any]:

@@ -218,7 +218,10 @@ class TopicRecorder:
         return self._writer.counts
 
     def close(self) -> bool:
-        """Complete the file and write metadata.yaml beside it; see `bag.write_metadata`."""
+        """Complete the file and write metadata.yaml beside it, see `bag.write_metadata`.
+
+        Raises OSError if metadata.yaml cannot be written.
+        """
         lost = {topic: str(count) for topic, count in self.lost.items()}
         self._writer.add_metadata("lost messages", lost)
         self._writer.close()

@@ -13,8 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from uam_lab.recording.mcap_reader import UnreadableLog, read_log
-from uam_lab.recording.node_statistics import statistics
-from uam_lab.rehearsal.laboratory_process import STATISTICS
+from uam_lab.recording.node_statistics import LABORATORY_FILE, statistics
 from uam_msgs_py.messages import topics
 
 NAME = "devices.json"
@@ -53,7 +52,7 @@ def read(log: Path, logs: Path) -> dict[str, Any]:
         found = {}
     data = found[topics.DIAGNOSTICS.name].messages if found else []
     figures = of_reports(values_of(deserialize_message(one, DiagnosticArray) for one in data))
-    return figures | of_laboratory(statistics(logs / STATISTICS))
+    return figures | of_laboratory(statistics(logs / LABORATORY_FILE))
 
 
 def values_of(messages: Iterable[DiagnosticArray]) -> dict[str, list[Mapping[str, str]]]:

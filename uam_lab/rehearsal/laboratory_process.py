@@ -13,6 +13,8 @@ import yaml
 
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.configuration import ConfigurationError
+from uam_lab.flight.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
+from uam_lab.recording.node_statistics import LABORATORY_FILE
 from uam_lab.rehearsal.emulated_lab import MAGNET_LINE, baud_of
 from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.vehicle.lab import Lab
@@ -26,14 +28,10 @@ from uam_sim_bridge.px4.px4_installation import Px4Installation
 from uam_sim_bridge.rehearsal.laboratory import SERIAL_FAR, USB
 
 LABORATORY, LABORATORY_MODULE = "laboratory", "uam_sim_bridge.nodes.laboratory"
-STAND_IN = "uam_sim_bridge.autopilot.server"
 PX4 = "uam_sim_bridge.px4.hitl"
-STATISTICS = "laboratory.json"
 PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them
 REQUIRED, IN_THE_LOOP = "px4/vehicle.yaml", "px4_parameters.yaml"  # in config/, in the logs
-PX4_LOG = "px4.ulg"  # in the result folder
 GRIPPER_ON, GRIPPER_OFF = 1.0, -1.0  # outputs of a closed and an open gripper
-AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 
 
 def parameters(
@@ -67,7 +65,7 @@ def parameters(
         "faults": options.faults.only(CABLE).to_text(),
         "person": options.checklist,
         "flight_limit": flight_limit,
-        "statistics": str(logs / STATISTICS),
+        "statistics": str(logs / LABORATORY_FILE),
     }
     found["poses"] = TOPIC if lab.mocap is None else NATNET
     if lab.mocap is None:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.processes.processes import NodeFailed
 from uam_lab.recording.log_reader import read_flight
 from uam_lab.recording.logged_topics import Log
 from uam_lab.recording.mcap_reader import UnreadableLog
-from uam_lab.recording.node_statistics import losses, statistics
-from uam_lab.rehearsal.laboratory_process import STATISTICS
+from uam_lab.recording.node_statistics import LABORATORY_FILE, losses, statistics
+from uam_lab.recording.setpoint_latencies import latencies
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
-from uam_msgs_py.messages import topics
 
-MISSED_TICKS = 3  # [control periods] from the sample to the setpoint, from which a tick is missed
 REFUSED = "start refused: "
 
 
@@ -32,7 +28,7 @@ def read_outcome(
     """
     outcome = Outcome(series=None, interrupted=interrupted)
     logs = folder.path / "logs"
-    numbers = statistics(logs / STATISTICS)
+    numbers = statistics(logs / LABORATORY_FILE)
     if refused:
         outcome.failure = REFUSED + refused
     elif failure is not None and not interrupted:
@@ -53,19 +49,3 @@ def read_outcome(
     if not flight.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome
-
-
-def latencies(log: Log, period: float) -> tuple[np.ndarray, int]:
-    """Return the times (m,) [s] from the IMU's samples to the sending of their setpoints.
-
-    And the number of missed ticks, sent later than MISSED_TICKS periods [s] or never. A tick has
-    the stamp of its sample; stamps and wall times are those of the same computer.
-    """
-    stamps, sent = log.published(topics.SETPOINT)
-    states, _ = log.published(topics.STATE)
-    if not len(stamps):
-        return np.zeros(0), len(states)
-    latency = 1e-9 * (sent - stamps)
-    within = states[(states >= stamps.min()) & (states <= stamps.max())]
-    never = len(np.setdiff1d(within, stamps))
-    return latency, int(np.sum(latency > MISSED_TICKS * period)) + never

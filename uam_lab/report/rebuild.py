@@ -13,6 +13,9 @@ from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_descri
 from uam_lab.flight.conclude import complete
 from uam_lab.recording import log_facts
 from uam_lab.recording.log_reader import read_flight
+from uam_lab.recording.logged_topics import Log
+from uam_lab.recording.node_statistics import LABORATORY_FILE
+from uam_lab.recording.setpoint_latencies import latencies
 from uam_lab.results import timeseries
 from uam_lab.results.atomic import write_text
 from uam_lab.results.outcome import Outcome
@@ -29,23 +32,29 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
 
     scenario: name or file, for a log without one. Returns the metrics. Facts that are not in the
     log (wall time, reason of the end) are read from `directory` if they are there. Raises
-    ResultFolderError, UnreadableLog, OSError.
+    ResultFolderError, also if another folder `out` contains a flight; UnreadableLog, OSError.
     """
-    log = directory / LOG
+    log, folder = directory / LOG, ResultFolder(out)
     if not log.exists():
         raise ResultFolderError(f"{directory} has no {LOG}")
+    if out.resolve() != directory.resolve():
+        folder.refuse_flight()
     facts = log_facts.read(log)
     before = _json(directory / "info.json")
     known = facts.info or before
     flown = _scenario(directory, facts, known, scenario)
-    flight = read_flight(log, flown, vehicle=_vehicle(known))
+    vehicle = _vehicle(known)
+    flight = read_flight(log, flown, vehicle=vehicle)
     numbers = _json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
+    latency, missed = flight.latency_s, flight.missed
+    if (directory / "logs" / LABORATORY_FILE).exists():  # of a rehearsal
+        latency, missed = latencies(Log.read(log), vehicle.control_period)
     outcome = Outcome(
         series=None,
         wall_s=numbers.get("wall_s") or before.get("wall_s") or flight.wall_s,
-        latency_s=numbers.get("latency_s", flight.latency_s) if realtime else None,
-        missed_ticks=numbers.get("missed_ticks", flight.missed) if realtime else None,
+        latency_s=numbers.get("latency_s", latency) if realtime else None,
+        missed_ticks=numbers.get("missed_ticks", missed) if realtime else None,
         errors_of=flight.errors_of,
         notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
     )
@@ -55,7 +64,7 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     out.mkdir(parents=True, exist_ok=True)
     for name in FILES:
         _take_over(name, directory, out, facts.texts)
-    return complete(ResultFolder(out), known, outcome)
+    return complete(folder, known, outcome)
 
 
 def series_of(directory: Path) -> timeseries.Series:

@@ -80,7 +80,6 @@ def compute(
     landing = landing_error(series, info.get("landing_point") or takeoff_point(series))
     shortfalls = what_is_missing(
         flown=left_the_ground(series, criteria),
-        landed=bool(series.in_phase("landed").any()),
         landing_error_m=landing,
         abort_reason=info.get("abort_reason") or "",
         payload=payload,
@@ -224,22 +223,24 @@ def landing_error(series: Series, point: Sequence[float]) -> float | None:
 
 def what_is_missing(
     flown: bool,
-    landed: bool,
     landing_error_m: float | None,
     abort_reason: str,
     payload: Payload,
     criteria: Criteria,
     grasps: Sequence[Mapping[str, Any]] = (),
 ) -> list[str]:
-    """Return the unmet criteria of a completed mission, one line each."""
+    """Return the unmet criteria of a completed mission, one line each.
+
+    landing_error_m: None if it has not landed.
+    """
     if abort_reason:
         return [f"aborted: {abort_reason}"]
     if not flown:
         return ["never took off"]
     missing = []
-    if not landed:
+    if landing_error_m is None:
         missing.append("not landed")
-    elif landing_error_m is None or not landing_error_m <= criteria.landing_m:
+    elif not landing_error_m <= criteria.landing_m:
         missing.append(f"landed {landing_error_m:.2f} m from the landing point")
     given_up = grasp_facts(grasps)["state"] == Grasp.GIVEN_UP.value
     if given_up and not payload.lifted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -51,6 +52,7 @@ class ResultFolder:
         self.versions = path / "versions.json"
         self.info = path / "info.json"
         self.log = path / "log.mcap"
+        self._latest_before: str | None = None  # where results/latest pointed, None for nowhere
 
     @classmethod
     def create(
@@ -69,16 +71,38 @@ class ResultFolder:
         if out is not None:
             folder = cls(Path(out).expanduser())
             _usable(folder.path)
-            if any(file.exists() for file in (folder.metrics, folder.timeseries, folder.log)):
-                raise ResultFolderError(
-                    f"result folder {folder.path} already contains a flight; give another --out"
-                )
-            if folder.path.absolute().parent == RESULTS.absolute():
-                _point_latest_at(folder.path)
-            return folder
-        folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
-        _point_latest_at(folder.path)
+            folder.refuse_flight()
+        else:
+            folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
+        if folder._link.parent.absolute() == RESULTS.absolute():
+            if folder._link.is_symlink():
+                folder._latest_before = os.readlink(folder._link)
+            _point(folder._link, folder.path.name)
         return folder
+
+    @property
+    def _link(self) -> Path:
+        return self.path.parent / LATEST
+
+    def refuse_flight(self) -> None:
+        """Raise ResultFolderError if the folder contains a flight."""
+        if any(file.exists() for file in (self.metrics, self.timeseries, self.log)):
+            raise ResultFolderError(
+                f"result folder {self.path} already contains a flight; give another --out"
+            )
+
+    def remove_if_empty(self) -> None:
+        """Remove the folder of a refused flight, with which results/latest points back."""
+        for path in (self.path / "logs", self.path):
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        link, before = self._link, self._latest_before
+        if self.path.exists() or not link.is_symlink() or os.readlink(link) != self.path.name:
+            return
+        if before is not None and (link.parent / before).exists():
+            _point(link, before)
+        else:
+            link.unlink()
 
     def write_parameters(self, parameters: Mapping[str, Any]) -> None:
         """Write the effective parameters, node by node, as a ROS parameter file."""
@@ -89,6 +113,17 @@ class ResultFolder:
 def write_json(path: Path, value: Any) -> None:
     """Write a JSON file; the same value gives the same bytes."""
     write_text(path, as_json(value))
+
+
+def read_json(file: Path) -> dict[str, Any]:
+    """Return the content of a JSON file, a mapping. Raises ResultFolderError, OSError."""
+    try:
+        found = json.loads(file.read_text())
+    except ValueError:
+        raise ResultFolderError(f"{file}: not valid JSON") from None
+    if not isinstance(found, dict):
+        raise ResultFolderError(f"{file}: a mapping expected")
+    return found
 
 
 def as_json(value: Any) -> str:
@@ -183,14 +218,13 @@ def _refusal(path: Path, error: OSError) -> ResultFolderError:
     return ResultFolderError(f"result folder {path} cannot be written: {reason}")
 
 
-def _point_latest_at(path: Path) -> None:
-    """Point results/latest at `path`; a file or folder of that name is kept."""
-    link = path.parent / LATEST
+def _point(link: Path, name: str) -> None:
+    """Point the link at `name` beside it; a file or folder of the link's name is kept."""
     if link.exists() and not link.is_symlink():
         print(f"{link} is no link and is not changed", file=sys.stderr)
         return
     try:
         with replacing(link) as temporary:
-            temporary.symlink_to(path.name, target_is_directory=True)
+            temporary.symlink_to(name, target_is_directory=True)
     except OSError as error:
         print(f"{link} could not be set: {error.strerror}", file=sys.stderr)

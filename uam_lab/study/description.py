@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.results.timeseries import SUBSYSTEMS
 
@@ -93,65 +93,77 @@ class Study:
 def load_study(name_or_file: str) -> Study:
     """Read a study of config/studies, or a file. Raises StudyError, ConfigurationError."""
     file = configuration.named("studies", name_or_file, suffixes=(".yaml",))
-    document = yaml_file.read(file, StudyError)
-    if not isinstance(document, dict) or set(document) != set(KEYS):
-        odd = sorted(set(KEYS) ^ set(document or {}))
+    top = read_section(file, StudyError)
+    document = top.values
+    if set(document) != set(KEYS):
+        odd = sorted(set(KEYS) ^ set(document))
         raise StudyError(f"{file}: {odd[0]}: missing, or no entry of a study")
-    _check(file, document)
-    rows = tuple(_row(file, label, entry) for label, entry in document["rows"].items())
-    base = document["nominal"]
-    known = {NOMINAL, *document["conditions"]}
+    _check(top)
+    given = top.section("rows")
+    rows = tuple(_row(given.section(label), label) for label in given.values)
+    base, varied = _mapping(top, "nominal"), _mapping(top, "conditions")
+    conditions = (
+        _condition(NOMINAL, base, Section({}, varied.where, StudyError)),
+        *(_condition(label, base, varied.section(label)) for label in varied.values),
+    )
+    known = {one.label for one in conditions}
     for row in rows:
         if strange := sorted(set(row.conditions) - known):
             raise StudyError(f"{file}: {row.label}: no condition '{strange[0]}'")
-    conditions = (
-        _condition(NOMINAL, base, {}),
-        *(_condition(label, base, entry) for label, entry in document["conditions"].items()),
-    )
-    return Study(file.stem, document, load_description(document["vehicle"]), rows, conditions)
+    return Study(file.stem, document, load_description(top.text("vehicle")), rows, conditions)
 
 
-def _row(file: Path, label: str, entry: dict[str, Any]) -> Row:
-    law, frozen = entry.get("law", ""), entry.get("frozen", "")
+def _mapping(section: Section, key: str) -> Section:
+    """Return the entry `key`, a mapping that may be empty or missing."""
+    if section.values.get(key, {}) == {}:
+        return Section({}, f"{section.where} {key}", StudyError)
+    return section.section(key)
+
+
+def _row(entry: Section, label: str) -> Row:
+    law, frozen = (entry.text(k) if k in entry.values else "" for k in ("law", "frozen"))
     if law and law not in catalogue.LAWS:
-        raise StudyError(f"{file}: {label}: law '{law}': {', '.join(catalogue.LAWS)} are allowed")
+        raise entry.error("law", f"'{law}': {', '.join(catalogue.LAWS)} are allowed")
     if frozen not in FROZEN:
-        raise StudyError(f"{file}: {label}: frozen '{frozen}': {', '.join(FROZEN[1:])} are allowed")
-    if not law and not entry.get("profiles"):
-        raise StudyError(f"{file}: {label}: a law or profiles expected")
-    profiles = tuple(entry.get("profiles", ()))
+        raise entry.error("frozen", f"'{frozen}': {', '.join(FROZEN[1:])} are allowed")
+    profiles, conditions = (
+        entry.texts(k) if k in entry.values else () for k in ("profiles", "conditions")
+    )
+    if not law and not profiles:
+        raise StudyError(f"{entry.where}: a law or profiles expected")
     return Row(
         label,
         law,
         frozen,
         profiles,
-        entry.get("autopilot") == "own",
-        bool(entry.get("common", False)),
-        tuple(entry.get("conditions", ())),
+        entry.values.get("autopilot") == "own",
+        "common" in entry.values and entry.switch("common"),
+        conditions,
     )
 
 
-def _condition(label: str, base: dict[str, Any], entry: dict[str, Any]) -> Condition:
-    return Condition(
-        label,
-        dict(base.get("vehicle", {})) | entry.get("vehicle", {}),
-        dict(base.get("trajectory", {})) | entry.get("trajectory", {}),
-        entry.get("of", ""),
-        float(entry.get("value", 0.0)),
+def _condition(label: str, base: Section, entry: Section) -> Condition:
+    vehicle, trajectory = (
+        _mapping(base, key).values | _mapping(entry, key).values
+        for key in ("vehicle", "trajectory")
     )
+    factor = entry.text("of") if "of" in entry.values else ""
+    value = entry.number("value") if "value" in entry.values else 0.0
+    return Condition(label, vehicle, trajectory, factor, value)
 
 
-def _check(file: Path, document: dict[str, Any]) -> None:
-    if set(document["feedback"]) != set(SUBSYSTEMS):
-        raise StudyError(f"{file}: feedback: {', '.join(SUBSYSTEMS)} expected")
-    if not 0.0 < document["spend"] < 1.0:
-        raise StudyError(f"{file}: spend: {document['spend']} is outside 0 to 1")
-    for law, ranges in document["ranges"].items():
-        known = document["adaptation"].get(law, {})
-        if set(ranges) != set(known):
-            raise StudyError(f"{file}: ranges: {law}: the entries of adaptation expected")
-        for name, (low, high) in ranges.items():
-            if not 0.0 < low <= known[name] <= high:
-                raise StudyError(
-                    f"{file}: adaptation: {law}: {name}: {known[name]} is outside {low} to {high}"
-                )
+def _check(top: Section) -> None:
+    if set(top.section("feedback").values) != set(SUBSYSTEMS):
+        raise top.error("feedback", f"{', '.join(SUBSYSTEMS)} expected")
+    if not 0.0 < top.number("spend") < 1.0:
+        raise top.error("spend", f"{top.number('spend')} is outside 0 to 1")
+    top.whole("seeds")
+    ranges, adaptation = top.section("ranges"), top.section("adaptation")
+    for law in ranges.values:
+        allowed, known = ranges.section(law), adaptation.section(law)
+        if set(allowed.values) != set(known.values):
+            raise ranges.error(law, "the entries of adaptation expected")
+        for name in known.values:
+            (low, high), value = allowed.numbers(name, 2), known.number(name)
+            if not 0.0 < low <= value <= high:
+                raise known.error(name, f"{value} is outside {low} to {high}")

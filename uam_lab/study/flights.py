@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from uam_control.coordinates import ARM, ATTITUDE
 from uam_control.profiles.profile import Profile
 from uam_lab.analysis import law_terms
 from uam_lab.campaign.fault_outcome import LOST, classify
-from uam_lab.campaign.trial import Trial, figures_of, fly
+from uam_lab.campaign.trial import Trial, figures_of, recorded
 from uam_lab.results.phase_errors import distance, root_mean_square
 from uam_lab.results.timeseries import SUBSYSTEMS, Series
 from uam_lab.study.description import Condition, Study
@@ -104,9 +104,9 @@ def flights(
 
 
 def measure(flight: StudyFlight) -> StudyResult:
-    """Fly; return the result."""
+    """Fly; return the result. Raises TrialFailed as `trial.recorded`."""
     trial = flight.trial
-    outcome = fly(trial)
+    outcome = recorded(trial)
     series = outcome.series
     figures = figures_of(trial, outcome, outcome.abort_reason)
     ended = classify(series, figures)
@@ -162,8 +162,3 @@ def _gains(series: Series, rows: np.ndarray) -> dict[str, tuple[float, ...]]:
         if rows.any() and np.isfinite(columns[0]).all():
             found[name] = tuple(float(np.mean(column)) for column in columns)
     return found
-
-
-def later(flight: StudyFlight, label: str) -> StudyFlight:
-    """Return the flight under another label of its row."""
-    return replace(flight, row=label)

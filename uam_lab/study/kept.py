@@ -10,7 +10,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from uam_lab.campaign.flying import fly_missing
+from uam_lab.campaign.flying import fly_missing, scenario_text
 from uam_lab.results.row_table import RowTable
 from uam_lab.study.flights import StudyFlight, StudyResult, measure
 from uam_lab.workers.place import Workplace
@@ -43,13 +43,13 @@ def fly(
 
 
 def mark(flight: StudyFlight) -> str:
-    """Return what identifies the inputs of a flight: profile, scenario, plant, seed, delays."""
+    """Return what identifies the inputs of a flight: profile, scenario, vehicle, seed, delays."""
     trial = flight.trial
     inputs = (
         *(flight.row, flight.condition, flight.judged, trial.payload_mass, trial.seed),
         *(sorted(trial.vehicle_changes.items()), trial.faults, trial.profile.sections),
         *(sorted(trial.profile.vehicle.autopilot_gains.items()), trial.engine),
-        Path(trial.scenario).read_text() if Path(trial.scenario).is_file() else trial.scenario,
+        *(trial.profile.vehicle.numbers, scenario_text(trial.scenario)),
     )
     return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]
 

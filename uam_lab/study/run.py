@@ -85,10 +85,9 @@ class Runner:
         return self._all(chosen, self._place, self._out)
 
     def _planned(
-        self, made: dict[str, Profile], conditions: Sequence[Condition], delay: float = 0.0
+        self, made: dict[str, Profile], conditions: Sequence[Condition]
     ) -> list[StudyFlight]:
-        folder = self._out / "scenarios"
-        return flights(self.study, made, conditions, self.seeds, folder, delay)
+        return flights(self.study, made, conditions, self.seeds, self._out / "scenarios")
 
     def varied(self, labels: Sequence[str] = ()) -> list[StudyResult]:
         """Fly every row in every condition, or in those of these labels only."""

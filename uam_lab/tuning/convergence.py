@@ -12,9 +12,9 @@ def improvement(curve: Sequence[float], patience: int) -> float:
     """Return by which share the last `patience` evaluations improved the result.
 
     curve: best cost, or area under the front, after each evaluation. infinity while there are not
-    more evaluations than that, or the result before them was zero.
+    more evaluations than that, for a patience below 1, or if the result before was zero.
     """
-    if len(curve) <= patience or curve[-1 - patience] == 0.0:
+    if patience < 1 or len(curve) <= patience or curve[-1 - patience] == 0.0:
         return math.inf
     before = curve[-1 - patience]
     return abs(curve[-1] - before) / abs(before)

@@ -9,6 +9,7 @@ several machines can use. The storage contains every evaluation, so a stopped se
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import warnings
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from functools import partial
 import optuna
 from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
-from optuna.trial import TrialState
+from optuna.trial import FrozenTrial, TrialState
 
 from uam_lab.campaign.trial import measure
 from uam_lab.flight.direct.warm_up import prepare
@@ -31,6 +32,7 @@ from uam_lab.workers.workers import workers
 STEP = 0.1  # initial step of CMA-ES around the start, as a fraction of the logarithmic range
 HOPELESS = 1.5  # a candidate is pruned when its cost exceeds this factor times the best cost
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
+PROBLEM = "problem"  # attribute of the study: `problem` of its space
 
 
 @dataclass(frozen=True)
@@ -57,29 +59,61 @@ def open_storage(where: str) -> JournalStorage | RDBStorage:
 
 
 def open_study(task: Task) -> optuna.Study:
-    """Open the study; a new study first evaluates the start values."""
+    """Open the study, a new one if there is none. Raises TuningError."""
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.filterwarnings("ignore", category=FutureWarning, module="optuna")
     space = task.space
-    start = {knob.name: knob.value(space.start) for knob in space.knobs}
     if space.delay_margin is None:
         directions = ["minimize"]
         sampler = optuna.samplers.CmaEsSampler(
-            x0=start, sigma0=task.step, seed=task.seed, warn_independent_sampling=False
+            x0=space.start_values,
+            sigma0=task.step,
+            seed=task.seed,
+            warn_independent_sampling=False,
         )
     else:
         directions = ["minimize", "maximize"]
         sampler = optuna.samplers.TPESampler(seed=task.seed, multivariate=True, constant_liar=True)
-    study = optuna.create_study(
+    return optuna.create_study(
         storage=open_storage(task.storage),
         study_name=task.study,
         sampler=sampler,
         directions=directions,
         load_if_exists=True,
     )
-    if not study.trials:
-        study.enqueue_trial(start, skip_if_exists=True)
-    return study
+
+
+def problem(space: Space) -> str:
+    """Return a digest of all that the costs depend on; equal on every machine."""
+    start, vehicle = space.start, space.start.vehicle
+    inputs = (
+        *(space.knobs, space.flights, space.cost, space.delay_margin),
+        *(start.sets, start.bridge(), vehicle.numbers, vehicle.autopilot_gains),
+    )
+    return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]
+
+
+def evaluated_start(space: Space, study: optuna.Study) -> FrozenTrial | None:
+    """Return the evaluation of the start values, None if it was not completed."""
+    done = study.get_trials(deepcopy=False, states=DONE)
+    return next((trial for trial in done if trial.params == space.start_values), None)
+
+
+def _begin(study: optuna.Study, space: Space) -> None:
+    """Enqueue the start values unless they are evaluated. Raises TuningError.
+
+    An evaluation that was killed stays RUNNING, so the start may be evaluated twice.
+    """
+    own = problem(space)
+    if study.user_attrs.get(PROBLEM, own) != own:
+        raise TuningError(
+            f"study {study.study_name} has evaluations of another space, profile, vehicle or "
+            "plant: give another --out or --study"
+        )
+    study.set_user_attr(PROBLEM, own)
+    waiting = study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
+    if not waiting and evaluated_start(space, study) is None:
+        study.enqueue_trial(space.start_values)
 
 
 def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float | tuple[float, float]:
@@ -148,10 +182,11 @@ def search(
 
     progress: called about once per second with the number of evaluations and the best cost, or with
     the volume of the front. A worker that is lost or comes later continues the same study. Raises
-    WorkersError, KeyboardInterrupt on Ctrl-C, and what an evaluation raises; the study keeps its
-    evaluations.
+    WorkersError, KeyboardInterrupt on Ctrl-C, TuningError for a study of another `problem`, and
+    what an evaluation raises; the study keeps its evaluations.
     """
     study = open_study(task)
+    _begin(study, task.space)
     seeds = itertools.count(task.seed)
     tasks = itertools.takewhile(
         lambda _: not finished(study, task), (replace(task, seed=one) for one in seeds)

@@ -16,7 +16,7 @@ from optuna.trial import FrozenTrial
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.tuning.front import chosen, front, hypervolumes
-from uam_lab.tuning.search import DONE
+from uam_lab.tuning.search import DONE, evaluated_start
 from uam_lab.tuning.space import Space
 
 matplotlib.use("Agg")
@@ -29,8 +29,10 @@ def best_of(space: Space, study: optuna.Study) -> FrozenTrial:
     return chosen(study.get_trials(deepcopy=False, states=DONE), space.delay_margin)
 
 
-def in_words(trial: FrozenTrial) -> str:
-    """Return cost and, if it is an objective, delay margin of an evaluation."""
+def in_words(trial: FrozenTrial | None) -> str:
+    """Return cost and, if it is an objective, delay margin of an evaluation; None: without one."""
+    if trial is None:
+        return "not evaluated"
     cost, *margin = trial.values
     return f"cost {cost:.4g}" + "".join(f", delay margin {1e3 * one:.1f} ms" for one in margin)
 
@@ -43,7 +45,7 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
     head = [
         f"Found by: {command}",
         f"Study {study.study_name}: evaluation {best.number} of {evaluations}, {in_words(best)} "
-        f"(start: {in_words(study.trials[0])}), from profile {space.start.name}.",
+        f"(start: {in_words(evaluated_start(space, study))}), from profile {space.start.name}.",
         f"Vehicle: {space.start.vehicle.name}.",
         "Flights of an evaluation: "
         + "; ".join(
@@ -78,6 +80,7 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
     """Draw the objectives of every evaluation, the progress, and the values of each knob."""
     trials = study.get_trials(deepcopy=False, states=DONE)
     costs, best = np.array([trial.values[0] for trial in trials]), best_of(space, study)
+    start = evaluated_start(space, study)
     columns = 4
     rows = -(-len(space.knobs) // columns)
     with style.styled():
@@ -88,10 +91,10 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
         else:
             curve, plane = top.subplots(1, 2)
             _draw_hypervolume(curve, trials)
-            _draw_front(plane, trials, best, space.delay_margin)
+            _draw_front(plane, trials, best, start, space.delay_margin)
         figure.suptitle(
             f"Search {study.study_name}, {space.start.vehicle.name}: {len(costs)} evaluations; "
-            f"best: {in_words(best)}; start: {in_words(trials[0])}",
+            f"best: {in_words(best)}; start: {in_words(start)}",
             fontsize=8,
         )
         for knob, small in zip(space.knobs, bottom.subplots(rows, columns).flat, strict=False):
@@ -119,7 +122,11 @@ def _draw_hypervolume(axis: Axes, trials: Sequence[FrozenTrial]) -> None:
 
 
 def _draw_front(
-    axis: Axes, trials: Sequence[FrozenTrial], best: FrozenTrial, at_least: float
+    axis: Axes,
+    trials: Sequence[FrozenTrial],
+    best: FrozenTrial,
+    start: FrozenTrial | None,
+    at_least: float,
 ) -> None:
     """Draw cost and margin of every evaluation; the front, the best and the start stand out."""
 
@@ -128,7 +135,8 @@ def _draw_front(
 
     axis.plot(*points(trials), ".", color=style.FLIGHTS[0], alpha=0.4, label="evaluation")
     axis.step(*points(front(trials)), where="post", color=style.INK, label="front")
-    axis.plot(*points([trials[0]]), "s", color=style.FLIGHTS[1], label="start")
+    if start is not None:
+        axis.plot(*points([start]), "s", color=style.FLIGHTS[1], label="start")
     axis.plot(*points([best]), "D", color=style.FLIGHTS[2], label="best")
     axis.axhline(1e3 * at_least, color=style.MUTED, linewidth=0.8, linestyle="--")
     axis.set(xscale="log", xlabel="cost", ylabel="delay margin [ms]")

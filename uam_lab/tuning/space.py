@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import NODES, Profile, default_profile, profile_of
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.trial import Trial, TrialResult
 from uam_sim_bridge.plant.effects import presets
@@ -97,6 +98,11 @@ class Space:
     cost: Cost
     delay_margin: float | None = None
 
+    @property
+    def start_values(self) -> dict[str, float]:
+        """Values of the start profile by name of the knob."""
+        return {knob.name: knob.value(self.start) for knob in self.knobs}
+
     def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
         """Return the start profile with the knobs at `values` (by name). Raises ProfileError."""
         sections = copy.deepcopy(self.start.sections)
@@ -141,52 +147,59 @@ def load_space(
     start: None for the vehicle's profile of the file's law; vehicle: None for the default one.
     Raises TuningError, ProfileError, ConfigurationError; one line each.
     """
-    try:
-        file = configuration.named("tuning", name_or_file)
-        document = yaml_file.read(file, TuningError)
-        if "judged_as" in document:  # flights and cost of another space, for a fair comparison
-            other = configuration.named("tuning", document["judged_as"])
-            document = {**yaml_file.read(other, TuningError), **document}
-        if document["controller"] not in catalogue.LAWS:
-            raise TuningError(
-                f"{file}: unknown controller '{document['controller']}'; "
-                f"there are: {', '.join(catalogue.LAWS)}"
-            )
-        start = start or default_profile(document["controller"], vehicle)
-        knobs = tuple(_knob(entry, start) for entry in document["knobs"])
-        cost = {
-            key: tuple(map(float, value)) if isinstance(value, list) else float(value)
-            for key, value in document["cost"].items()
-        }
-        flights = tuple(
-            {
-                **flight,
-                "payload_mass": float(flight["payload_mass"]),
-                "seed": int(flight["seed"]),
-                "effects": presets.read([flight.get("plant_preset", presets.CALM)]),
-            }
-            for flight in document["flights"]
-        )
-        margin = document.get("delay_margin")
-        least = None if margin is None else float(margin["at_least"])
-        space = Space(file.stem, start, knobs, flights, Cost(**cost), least)
-    except (KeyError, TypeError) as error:
-        raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
-    names = start.vehicle.coordinates
-    if len(space.cost.aim) != len(names):
-        raise TuningError(
-            f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(names)} are "
-            f"expected: {', '.join(names)}"
-        )
-    if not flights or not knobs:
-        raise TuningError(f"{file}: at least one flight and one knob are expected")
-    return space
+    file = configuration.named("tuning", name_or_file)
+    top = read_section(file, TuningError)
+    if "judged_as" in top.values:  # flights and cost of another space, for a fair comparison
+        other = configuration.named("tuning", top.text("judged_as"))
+        top.values = {**read_section(other, TuningError).values, **top.values}
+    law = top.text("controller")
+    if law not in catalogue.LAWS:
+        there = ", ".join(catalogue.LAWS)
+        raise TuningError(f"{file}: unknown controller '{law}'; there are: {there}")
+    start = start or default_profile(law, vehicle)
+    two = "delay_margin" in top.values
+    return Space(
+        file.stem,
+        start,
+        tuple(_knob(entry, start) for entry in top.entries("knobs")),
+        tuple(map(_flight, top.entries("flights"))),
+        _cost(top.section("cost"), len(start.vehicle.coordinates)),
+        top.section("delay_margin").number("at_least") if two else None,
+    )
 
 
-def _knob(entry: dict[str, Any], start: Profile) -> Knob:
-    entry = dict(entry)
-    nodes = (entry.pop("node"),) if "node" in entry else tuple(entry.pop("nodes"))
-    knob = Knob(nodes, **{**entry, "entries": tuple(entry.get("entries", ()))})
+def _flight(entry: Section) -> dict[str, Any]:
+    entry.only(("payload_mass", "seed", "scenario", "vehicle", "plant_preset"))
+    names = {"scenario", "plant_preset"}.intersection(entry.values)
+    given: dict[str, Any] = {name: entry.text(name) for name in sorted(names)}
+    if entry.values.get("vehicle"):
+        given["vehicle"] = entry.section("vehicle").values
+    return {
+        **given,
+        "payload_mass": entry.not_negative("payload_mass"),
+        "seed": entry.whole("seed"),
+        "effects": presets.read([given.get("plant_preset", presets.CALM)]),
+    }
+
+
+def _cost(entry: Section, coordinates: int) -> Cost:
+    names = [field.name for field in fields(Cost)]
+    entry.only(names)
+    counts = {"aim": coordinates, "restless_allowed": 2}
+    return Cost(**{
+        name: entry.numbers(name, counts[name]) if name in counts else entry.number(name)
+        for name in names
+    })  # fmt: skip
+
+
+def _knob(entry: Section, start: Profile) -> Knob:
+    entry.only(("node", "nodes", "parameter", "entries", "low", "high"))
+    nodes = entry.texts("nodes") if "nodes" in entry.values else (entry.text("node"),)
+    entries = entry.values.get("entries", [])
+    if not isinstance(entries, list) or not all(type(one) is int for one in entries):
+        raise entry.error("entries", f"a list of 0, 1, 2, .. expected, got {entries!r}")
+    low, high = entry.number("low"), entry.number("high")
+    knob = Knob(nodes, entry.text("parameter"), low, high, tuple(entries))
     for node in nodes:
         if node not in NODES:
             raise TuningError(f"{knob.name}: no such node; there are: {', '.join(NODES)}")

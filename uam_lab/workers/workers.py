@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import queue
 import time
@@ -50,12 +51,28 @@ def workers(
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
     try:
-        client = Client(address, timeout=CONNECTING, set_as_default=False)
-    except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0] or type(error).__name__
-        raise WorkersError(f"scheduler {address}: {reason}") from None
+        client = _LimitedClient(address, timeout=CONNECTING, set_as_default=False)
+    except Exception as error:  # what answers may be anything: Dask raises different types
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise WorkersError(
+            f"scheduler {address}: {reason}; the address that `dask scheduler` prints is expected, "
+            "with its port, not the dashboard's"
+        ) from None
     with client:
         yield client
+
+
+class _LimitedClient(Client):
+    """Gives up on a port that accepts and stays silent: Dask's handshake has no time limit."""
+
+    async def _start(self, timeout: float, **options: Any) -> Client:
+        try:
+            return await asyncio.wait_for(super()._start(timeout=timeout, **options), timeout)
+        except Exception as error:
+            await self._close()  # else it complains when it is collected
+            if isinstance(error, TimeoutError) and not str(error):
+                raise TimeoutError(f"no answer within {timeout:g} s") from None
+            raise
 
 
 class Workers:

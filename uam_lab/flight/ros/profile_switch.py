@@ -2,7 +2,7 @@
 
 First every node checks its values (`~/check_parameters`, without any change). If all accept, each
 node receives its values in one request and applies them between two ticks. If a node still
-refuses, the others get their old values back.
+refuses or does not answer, the others get their old values back.
 """
 
 from __future__ import annotations
@@ -26,12 +26,17 @@ from uam_msgs_py.node.tunable import CHECK
 PATIENCE = 10.0  # [s] wall time to find a service, and the same to receive its response
 AGAIN = 1.0  # [s] after which a request is repeated
 APPLY = "set_parameters_atomically"
+NO_RESPONSE = "no response"
 
 Values = dict[str, Any]
 
 
 class SwitchRefused(ValueError):
     """The profile was refused and the old values stay active; one line per refusing node."""
+
+
+class SwitchIncomplete(SwitchRefused):
+    """The profile was refused, and some nodes may have its values; one more line for each."""
 
 
 class ProfileSwitch:
@@ -45,7 +50,7 @@ class ProfileSwitch:
     def switch(self, profile: Profile) -> dict[str, dict[str, tuple[Any, Any]]]:
         """Activate `profile`; return the changes: node → name → (old, new).
 
-        Raises SwitchRefused without any change.
+        Raises SwitchRefused without any change, SwitchIncomplete.
         """
         return self.change(_desired(profile))
 
@@ -62,9 +67,17 @@ class ProfileSwitch:
         answers = self._ask(APPLY, new)
         try:
             self._all_accept(answers)
-        except SwitchRefused:
+        except SwitchRefused as refused:
+            # a silent node may have applied the values; it comes last, and each node is asked on
+            # its own, so that it does not delay the others
             taken = [node for node, reason in answers.items() if not reason]
-            self._ask(APPLY, {n: {name: old[n][name] for name in new[n]} for n in taken})
+            taken += [node for node, reason in answers.items() if reason == NO_RESPONSE]
+            kept: dict[str, str] = {}
+            for node in taken:
+                kept |= self._ask(APPLY, {node: {name: old[node][name] for name in new[node]}})
+            lines = [f"{n}: may have the new values: {why}" for n, why in kept.items() if why]
+            if lines:
+                raise SwitchIncomplete("\n".join([str(refused), *lines])) from None
             raise
         return {
             node: {name: (old[node][name], value) for name, value in values.items()}
@@ -73,15 +86,17 @@ class ProfileSwitch:
 
     def _current(self, desired: Mapping[str, Values]) -> dict[str, Values]:
         """Return the active values of the `desired` parameters that the nodes have."""
-        listed = self._call(
+        listed, missing = self._call(
             ListParameters, "list_parameters", {n: ListParameters.Request() for n in desired}
         )
+        self._all_accept(missing)
         names = {
             node: [name for name in values if name in listed[node].result.names]
             for node, values in desired.items()
         }
         requests = {node: GetParameters.Request(names=own) for node, own in names.items()}
-        found = self._call(GetParameters, "get_parameters", requests)
+        found, missing = self._call(GetParameters, "get_parameters", requests)
+        self._all_accept(missing)
         current = {
             node: dict(zip(own, map(plain, found[node].values), strict=True))
             for node, own in names.items()
@@ -103,8 +118,8 @@ class ProfileSwitch:
             )
             for node, values in changes.items()
         }
-        answers = self._call(SetParametersAtomically, service, requests)
-        return {
+        answers, missing = self._call(SetParametersAtomically, service, requests)
+        return missing | {
             node: "" if answer.result.successful else answer.result.reason or "no reason given"
             for node, answer in answers.items()
         }
@@ -115,24 +130,32 @@ class ProfileSwitch:
         if refused:
             raise SwitchRefused("\n".join(refused))
 
-    def _call(self, kind: type, service: str, requests: Mapping[str, Any]) -> dict[str, Any]:
-        """Call a service of several nodes in parallel; node → response. Raises SwitchRefused."""
+    def _call(
+        self, kind: type, service: str, requests: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, str]]:
+        """Call a service of several nodes in parallel, or of none if one does not have it.
+
+        Returns node → response, and node → complaint for those without one.
+        """
         clients = {node: self._node.create_client(kind, f"{node}/{service}") for node in requests}
         try:
-            self._until(lambda node: clients[node].service_is_ready(), clients, "service not found")
+            missing = self._missing(lambda node: clients[node].service_is_ready(), clients)
+            if missing:
+                return {}, dict.fromkeys(missing, "service not found")
             calls = {node: _Call(clients[node], requests[node]) for node in clients}
-            self._until(lambda node: calls[node].done(), calls, "no response")
-            return {node: call.response for node, call in calls.items()}
+            missing = self._missing(lambda node: calls[node].done(), calls)
+            answers = {node: call.response for node, call in calls.items() if node not in missing}
+            return answers, dict.fromkeys(missing, NO_RESPONSE)
         finally:
             for client in clients.values():
                 self._node.destroy_client(client)
 
-    def _until(self, done: Callable[[str], bool], nodes: Collection[str], complaint: str) -> None:
+    def _missing(self, done: Callable[[str], bool], nodes: Collection[str]) -> list[str]:
+        """Spin until every node is `done`; return those that are not after PATIENCE."""
         end = time.monotonic() + PATIENCE
-        while missing := [node for node in nodes if not done(node)]:
-            if time.monotonic() > end:
-                self._all_accept(dict.fromkeys(missing, complaint))
+        while (missing := [node for node in nodes if not done(node)]) and time.monotonic() <= end:
             self._executor.spin_once(timeout_sec=0.02)
+        return missing
 
 
 class _Call:

@@ -17,10 +17,10 @@ OUT_OF_SIGHT = (50.0, 50.0, -1.0)
 class Poses:
     """A MuJoCo model with its data, which can be set to any recorded state."""
 
-    def __init__(self, series: Series, vehicle: Vehicle | None = None):
+    def __init__(self, series: Series):
         mass = series.info.get("payload_mass_kg") or 0.0
         self.series = series
-        self.vehicle = vehicle or Vehicle.load(series.info.get("vehicle") or DEFAULT_VEHICLE)
+        self.vehicle = Vehicle.load(series.info.get("vehicle") or DEFAULT_VEHICLE)
         self.model = self.vehicle.compile(mass)
         self.data = mujoco.MjData(self.model)
         self.has_payload = mass > 0.0 and not np.isnan(series["payload.x"]).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.video.flight_video import Rendered, existing
 from uam_lab.results import templates
 from uam_lab.results.atomic import write_text
+from uam_lab.results.result_folder import read_json
 
 PAPER_SCENARIO = "pick_and_place"
 FACTS = (
@@ -33,7 +33,8 @@ FACTS = (
 def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     """Write `directory`/report.html from the files in the result folder; return its path.
 
-    rendered: result of the renderer; without it the page shows the existing pictures.
+    rendered: result of the renderer; without it the page shows the existing pictures. Raises
+    ResultFolderError for a file that is no JSON.
     """
     metrics = _json(directory / "metrics.json")
     info = _json(directory / "info.json")
@@ -102,4 +103,4 @@ def _embedded(file: Path | None) -> str | None:
 
 
 def _json(file: Path) -> Mapping[str, Any]:
-    return json.loads(file.read_text()) if file.exists() else {}
+    return read_json(file) if file.exists() else {}

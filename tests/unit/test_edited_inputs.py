@@ -1,0 +1,87 @@
+"""Rows of a table belong to the content of the input files; options that cannot act are refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from uam_control.profiles.profile import load_profile
+from uam_control.settings import configuration
+from uam_lab.campaign.trial import Trial
+from uam_lab.cli.main import main
+from uam_lab.results import row_table
+from uam_lab.results.row_table import RowTableError
+from uam_lab.study import kept
+from uam_lab.study.flights import StudyFlight
+
+FOREIGN = {
+    "--vehicle": "s500_arm",
+    "--scenario": "pick_and_place",
+    "--payload-mass": "0.2",
+    "--rows": "proposed",
+    "--profile": "mine=s500",
+    "--plant-preset": "calm",
+    "--effect": "ground_effect",
+}
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    """A scenario file of the user."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(configuration.path("scenarios/hover.yaml").read_text())
+    return file
+
+
+def edit(file):
+    """Change a file so that it means the same: its rows may still be others."""
+    file.write_text(file.read_text() + "# edited\n")
+
+
+@pytest.mark.parametrize("command", ["campaign", "compare --rows proposed", "faults"])
+def test_rows_are_of_other_flights_after_an_edit_of_the_scenario(
+    scenario, tmp_path, monkeypatch, command
+):
+    found = []
+
+    def table(file, schema, of):
+        found.append(repr(of))
+        raise RowTableError("nothing flies here")
+
+    monkeypatch.setattr(row_table, "RowTable", table)
+    matrix = tmp_path / "matrix.yaml"
+    matrix.write_text(
+        "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, joint: 1}]}"
+    )
+    words = [*command.split(), "--scenario", str(scenario), "--out", str(tmp_path / "out")]
+    words += ["--matrix", str(matrix)] if command == "faults" else []
+    assert main(words) == 2 and main(words) == 2
+    edit(scenario)
+    assert main(words) == 2
+    assert found[0] == found[1] != found[2]
+
+
+def test_a_study_knows_an_edited_scenario_and_another_vehicle_of_the_same_name(scenario):
+    profile = load_profile("s500")
+    trial = Trial("row", profile, 0.0, 1, str(scenario))
+    before = kept.mark(StudyFlight("row", "nominal", trial))
+    assert kept.mark(StudyFlight("row", "nominal", trial)) == before
+    heavier = replace(profile.vehicle, numbers=profile.vehicle.numbers | {"ground": 1.0})
+    edited = replace(trial, profile=replace(profile, vehicle=heavier))
+    assert kept.mark(StudyFlight("row", "nominal", edited)) != before
+    edit(scenario)
+    assert kept.mark(StudyFlight("row", "nominal", trial)) != before
+
+
+@pytest.mark.parametrize("option", FOREIGN)
+def test_a_study_refuses_options_that_are_not_its_own(option, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "--study", "adaptation", "--design", option, FOREIGN[option]]) == 2
+    out, err = capsys.readouterr()
+    assert f"{option}: not with --study, which has its own" in err
+    assert err.count("\n") == 1 and not out and not any(tmp_path.iterdir())
+
+
+def test_parts_of_a_study_need_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "--part", "arm", "--design"]) == 2
+    assert "--part, --design: only with --study" in capsys.readouterr().err

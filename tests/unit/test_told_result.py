@@ -1,0 +1,38 @@
+"""What `uam fly` and `uam rehearse` print at the end of a flight."""
+
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from uam_lab.cli import rehearse
+from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, tell
+from uam_lab.library.flight_result import FlightResult
+from uam_lab.processes.interrupts import INTERRUPTED
+from uam_lab.results.outcome import Outcome
+
+
+@pytest.mark.parametrize(
+    ("outcome", "dry_run", "status"),
+    [
+        (Outcome(None, failure="arm_driver was killed", details=["last words"]), False, 1),
+        (Outcome(None, failure="arm_driver was killed", details=["last words"]), True, 1),
+        (Outcome(None, interrupted=True), False, INTERRUPTED),
+        (Outcome(None), True, COMPLETED),
+        (Outcome(None, notes=["a note"]), False, NOT_COMPLETED),
+    ],
+)
+def test_the_reason_goes_to_the_errors_and_the_rest_to_the_output(
+    tmp_path, capsys, outcome, dry_run, status
+):
+    settings, result = SimpleNamespace(dry_run=dry_run), FlightResult(tmp_path, None, outcome)
+    assert tell(Console(), settings, result, "rehearse", False, True, ["a device"]) == status
+    said = capsys.readouterr()
+    assert said.out.startswith(f"results: {tmp_path}\na device\n")
+    assert said.out.count("note: ") == len(outcome.notes)
+    failed = "uam rehearse: arm_driver was killed\n  | last words\n"
+    assert said.err == (failed if outcome.failure else "")
+
+
+def test_a_rehearsal_ends_as_a_flight():
+    assert rehearse.tell is tell
