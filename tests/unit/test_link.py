@@ -411,6 +411,16 @@ def test_answers_to_other_components_are_ignored(rig):
     assert "denied" not in rig.reasons() and rig.sequence.phase is Phase.FLYING
 
 
+def test_a_heartbeat_of_another_component_is_not_the_autopilots(rig):
+    """A gimbal that names itself a generic autopilot: it is not armed, and has no mode."""
+    rig.fly()
+    gimbal = Codec(1, mavlink2.MAV_COMP_ID_GIMBAL)
+    said = mavlink2.MAVLink_heartbeat_message(26, mavlink2.MAV_AUTOPILOT_GENERIC, 0, 0, 4, 3)
+    rig.memory.to_link.append(gimbal.encode(said))
+    rig.run(1.0)
+    assert rig.sequence.phase is Phase.FLYING and rig.link.armed
+
+
 def test_the_same_messages_twice():
     """The link depends on ticks and messages only."""
 

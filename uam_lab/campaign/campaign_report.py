@@ -156,7 +156,7 @@ def _worst_table(worst: Sequence[dict[str, Any]]) -> str:
             [
                 str(one["flight"]),
                 one["outcome"],
-                f"{one['position_rms_m']:.3g}",
+                "unknown" if math.isnan(one["position_rms_m"]) else f"{one['position_rms_m']:.3g}",
                 f"`{one['again']}`",
             ]
             for one in worst

@@ -256,10 +256,14 @@ class MavlinkBridgeNode(UamNode):
             self._magnet.update(stamp / SECOND)
 
     def _end_tick(self, stamp: int) -> None:
-        """End a tick: forward to the ground station, publish the autopilot's state."""
+        """End a tick: forward the ground station's messages, publish the autopilot's state."""
+        self._forward()
+        self._autopilot.publish(stamp, self.stage.report)
+
+    def _forward(self) -> None:
+        """Forward the ground station's messages, if there is one."""
         if self._station is not None:
             self._station.forward()
-        self._autopilot.publish(stamp, self.stage.report)
 
     def _adopt(self) -> None:
         """Adopt the autopilot's parameters if `autopilot_parameters` is adopt; not while armed."""
@@ -309,6 +313,8 @@ class MavlinkBridgeNode(UamNode):
             now = time.time()
             self.link.poll(now)
             self.link.maintain(now)
+        if self.ticks == 0:  # a command that waited for the first tick would act much later
+            self._forward()
         if self.ticks == 0 or silence < self._options.stale_after:
             return
         self._go_without(self.stamp + round(silence * SECOND))

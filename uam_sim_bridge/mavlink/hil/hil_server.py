@@ -110,7 +110,7 @@ class HilServer(HilMessages):
             self._link.settimeout(self.parameters.answer_timeout)
             self._link.sendall(data)
             self._link.setblocking(False)
-        except (ConnectionError, TimeoutError):
+        except OSError:
             self._stop()
 
     def receive(self, timeout: float | None = None) -> np.ndarray:
@@ -147,7 +147,7 @@ class HilServer(HilMessages):
             data = self._link.recv(65536)
         except BlockingIOError:
             return True
-        except ConnectionError:
+        except OSError:
             return False
         for message in self.received(data):
             if self.take(message):

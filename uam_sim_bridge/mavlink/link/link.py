@@ -43,6 +43,11 @@ UNSIGNED = (
     "the autopilot does not sign its messages, and signing_key is set: all are refused. PX4 v1.16 "
     "has no MAVLink signing: start without signing_key, on a link that nobody else reaches"
 )
+# other components of the vehicle, as a gimbal, send these, too, with other meaning
+OF_AUTOPILOT = {
+    *("HEARTBEAT", "CURRENT_MODE", "EXTENDED_SYS_STATE", "COMMAND_ACK"),
+    *("TIMESYNC", "ATTITUDE_QUATERNION"),
+}
 EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 
 
@@ -244,6 +249,9 @@ class OffboardLink(FlightState):
 
     def _handle(self, time: float, m: Message) -> None:
         kind = m.get_type()
+        if kind in OF_AUTOPILOT and m.get_srcComponent() != mavlink2.MAV_COMP_ID_AUTOPILOT1:
+            self.ignored += 1
+            return
         self._watch_clock(time, kind, m)
         if kind == "HEARTBEAT":
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
@@ -286,8 +294,6 @@ class OffboardLink(FlightState):
 
     def _watch_clock(self, time: float, kind: str, m: Message) -> None:
         """Pass the autopilot's time to the reboot detection and the time synchronisation."""
-        if m.get_srcComponent() != mavlink2.MAV_COMP_ID_AUTOPILOT1:
-            return
         if kind == "TIMESYNC":
             since_boot = (m.tc1 or m.ts1) * 1e-9
         elif kind == "ATTITUDE_QUATERNION":

@@ -13,6 +13,8 @@ from uam_sim_bridge.mavlink.transport.stream_transport import CHUNK, StreamTrans
 from uam_sim_bridge.mavlink.transport.udp_transport import resolve
 
 CONNECT_PATIENCE = 3.0  # s, time limit of one attempt to connect
+# ms without an acknowledgement after which the link is lost: setpoints must not arrive much later
+SILENT_PEER = 1500
 
 
 class TcpTransport(StreamTransport):
@@ -33,6 +35,7 @@ class TcpTransport(StreamTransport):
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._socket.setblocking(False)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_PEER)
             self._until = now + CONNECT_PATIENCE
             code = self._socket.connect_ex(self._remote)
             if code not in (0, errno.EINPROGRESS):
