@@ -7,8 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_control.settings import configuration
 from uam_control.supervision import OperatorCommand, State
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results.metrics import compute
@@ -74,6 +76,46 @@ def test_a_command_to_land_is_followed_where_the_vehicle_is_with_the_payload_rel
     at, _ = landed_softly(made)
     assert at == pytest.approx(x, abs=0.15)
     assert made.recording.series()["magnet.on"][-1000] == 0.0
+
+
+def most_tilt(a_flight):
+    series = a_flight.recording.series()
+    return np.degrees(np.nanmax(np.hypot(series["truth.roll"], series["truth.pitch"])))
+
+
+@pytest.mark.parametrize("after", [0.05, 0.3])
+def test_a_landing_while_the_payload_still_stands_lets_it_go(after):
+    """With the magnet on, the arm that stows would lever the vehicle over on the stand."""
+    made = flight("quick_pick")
+    until(made, lambda o: o.magnet)
+    begun = made.mission.output.time
+    until(made, lambda o: o.time > begun + after)
+    assert made.mission.request(OperatorCommand.LAND)[0]
+    output = until(made, lambda o: o.done)
+    assert output.phase == "landed" and most_tilt(made) < 15.0
+    landed_softly(made)
+
+
+def test_a_payload_that_is_too_heavy_to_lift_is_left_where_it_is():
+    made = flight("quick_pick", payload=1.3)
+    output = until(made, lambda o: o.done)
+    assert output.phase == "landed" and output.grasp is Grasp.GIVEN_UP
+    assert most_tilt(made) < 30.0
+    landed_softly(made)
+
+
+def test_a_landing_that_is_due_while_a_grasp_stops_the_clock_comes_later(tmp_path):
+    """The magnet does not let go, and the landing follows 1.2 s after the release."""
+    text = (configuration.path("scenarios") / "quick_pick.yaml").read_text()
+    moves, rest = text.split("  - {coordinate: x, from: 14", 1)
+    rest = "\nmagnet:" + rest.split("\nmagnet:", 1)[1].split("\nsnapshots:")[0]
+    file = tmp_path / "drop_and_land.yaml"
+    file.write_text(moves + rest.replace("{at: 17, duration: 4}", "{at: 14.7, duration: 4}"))
+    scenario = load_scenario(str(file))
+    faults = read_schedule(["magnet_stuck@drop"], scenario, 1)
+    made = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), 0.2, 1, faults=faults)
+    output = until(made, lambda o: o.done, limit=60.0)
+    assert output.phase == "landed" and output.grasp is Grasp.STUCK
 
 
 def test_a_fence_left_is_landed_at():

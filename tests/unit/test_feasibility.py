@@ -253,6 +253,29 @@ def test_a_flight_is_refused_before_it_starts_or_slowed_down():
     assert made.scenario.landing.at > load_scenario("ellipse").landing.at
 
 
+NEAR_GROUND = [
+    ("moves: [{coordinate: z, from: 0, until: 2, to: 0.3},"
+     " {coordinate: x, from: 2, until: 6, to: 1}]\nlanding: {at: 7, duration: 3}",
+     "height while it moves across 0.015 m is below 0.05 m"),
+    ("trajectory: {kind: circle, radius: 0.5, speed: 0.5, height: 0.25}",
+     "height while it moves across"),
+    ("moves: [{coordinate: z, from: 0, until: 3, to: 1}]\nlanding: {at: 4, duration: 1}",
+     "sink rate near the ground"),
+    ("moves: [{coordinate: z, from: 0, until: 3, to: 1}]\nlanding: {at: 4, duration: 3}", ""),
+    ("moves: [{coordinate: z, from: 0, until: 3, to: 0.5},"
+     " {coordinate: x, from: 3, until: 6, to: 1}]\nlanding: {at: 7, duration: 3}", ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "reason"), NEAR_GROUND)
+def test_what_turns_over_on_the_ground_or_hits_it_is_refused(tmp_path, text, reason):
+    file = tmp_path / "low.yaml"
+    file.write_text(text)
+    check = Feasibility(PROFILE.vehicle, PROFILE.sets["mission"], 0.0)
+    found = in_words(check.excesses(load_scenario(str(file))))
+    assert found.startswith(reason) and bool(found) is bool(reason)
+
+
 def test_the_second_flight_is_compared_with_the_limits_of_its_time():
     """A limit that was lowered in the first flight is not checked there, but before the next."""
     parameters = PROFILE.sets["mission"]

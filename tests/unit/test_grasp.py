@@ -248,10 +248,13 @@ def test_given_up_may_land():
     assert flight.executive.directive.land.startswith("given up, 1 approaches")
 
 
-def test_an_absent_payload_costs_no_time():
+@pytest.mark.parametrize("where", [(5.0, 5.0, 0.04), (-0.75, 0.0, 0.04)])
+def test_an_absent_payload_costs_no_time(where):
+    """Far away, or on the floor below its place."""
     flight = Flight(lambda attempt: False)
-    flight.payload = np.array([5.0, 5.0, 0.04])
+    flight.payload = np.array(where)
     assert flight.until() == [Grasp.ABSENT]
+    assert flight.executive.directive.without_descent == flight.windows[0]
     assert flight.stamp - 128.0 == pytest.approx(75.0 - 28.0, abs=2 * STEP)
 
 

@@ -93,6 +93,7 @@ def test_what_the_model_is_made_of():
         ((("joints", 1, "stowed_deg"), 150), "joints[1].stowed_deg: 150 is outside the joint"),
         ((("servos", "effort_limit"), 4.0), "4 N m is above stall_torque, 3 N m"),
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),
+        ((("control_period",), 0.02), "control_period: 0.02 s is above 0.01 s"),
         ((("air", "drag"), [0.1]), "air.drag: a list of 3 numbers expected"),
         ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 is not above 0"),
         (

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from uam_control.coordinates import Z
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import RunningMean, Sight
 
@@ -81,8 +82,8 @@ class Alignment:
         return f"{1e3 * self.distance:.0f} mm off the {of}, swing {1e3 * self.swing:.0f} mm"
 
     def near(self, distance: float) -> bool:
-        """Return whether the payload is within `distance` [m], and that is known."""
-        return self.known and self.distance <= distance
+        """Return whether the payload is within `distance` [m], across and in height; known."""
+        return self.known and max(self.distance, abs(self._distance.mean.item(Z))) <= distance
 
     def correction(self, shift: np.ndarray, p: GraspParameters, worth: float = WORTH) -> np.ndarray:
         """Return the new shift (3,) [m] of the path in place of `shift` (3,).

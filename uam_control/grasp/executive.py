@@ -74,6 +74,8 @@ class GraspExecutive:
 
     def due(self, time: float) -> bool:
         """Return whether a window is near at scenario time [s]."""
+        if self._step is not Step.IDLE:  # a retreat may pass the begin
+            return True
         return bool(self._windows) and time >= self._windows[0].descent - BEFORE
 
     def step(self, sight: Sight) -> Directive:
@@ -123,10 +125,11 @@ class GraspExecutive:
                 self.directive.shift = alignment.correction(shift, p, p.align_tolerance)
             return
         self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
-        if sight.tracked and alignment.known and alignment.distance > p.align_range:
+        if sight.tracked and alignment.known and not alignment.near(p.align_range):
             self._attempt = 1
             where = place(sight.payload)
             self._decide(sight, Grasp.ABSENT, f"no payload below; payload at {where}")
+            self.directive = Directive(without_descent=window)
             self._end()
         elif alignment.good(p):
             self._begin_descent(sight)
@@ -202,6 +205,10 @@ class GraspExecutive:
             self._verify(sight, window)
 
     def _verify(self, sight: Sight, window: GraspWindow) -> None:
+        if self._touches(sight):  # held down: a payload that cannot be lifted
+            error = _across(sight.error)
+            self._go_back(sight, f"not lifted, position error {error:.2f} m")
+            return
         evidence = self._evidence(sight)
         lasts = self._lasting(sight.stamp, bool(evidence.held))
         lasted = lasts >= (0.0 if sight.tracked else WEIGHED_FOR)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
@@ -26,6 +26,8 @@ from uam_control.vehicle.arm_model import ArmModel
 STEP = 0.01  # [s] between two checks
 PART = 60000  # checks in one part of a long flight
 BESIDE = 4  # further ones on both sides of a part: second derivatives there are those of the whole
+CRAWL = 0.05  # [m/s] across: a vehicle that still stands on its gear turns over
+HARD = 1.0  # [m/s] sink rate at the ground that damages the gear
 ROUNDING = 1e-6  # [SI]
 PRECISION = 1e-3  # of the slowdown, relative
 ROOM = 1.002  # by which the slowdown is larger than the least one found
@@ -149,6 +151,9 @@ class Feasibility:
         place = demand.position.T
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
+        height, sinking = self._near_ground(demand, ground)
+        lower.append(("height while it moves across", height, p.touchdown_height, "m"))
+        upper.append(("sink rate near the ground", sinking, HARD, "m/s"))
         found = []
         for sign, checks in ((1.0, upper), (-1.0, lower)):
             for quantity, values, limit, unit in checks:
@@ -158,6 +163,18 @@ class Feasibility:
                     at = float(demand.times[worst]), float(demand.times[first])
                     found.append(Excess(quantity, float(values[worst]), float(limit), unit, *at))
         return sorted(found, key=lambda excess: excess.first)
+
+    def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return heights (m,) [m] of a vehicle that moves across before it was airborne, and sink
+        rates (m,) [m/s] of one that comes straight down; infinite at all other times.
+        """
+        height = demand.position[:, Z] - ground
+        velocity = np.gradient(demand.position, demand.times, axis=0)
+        across = np.hypot(velocity[:, X], velocity[:, Y]) > CRAWL
+        airborne = height > self.limits.airborne_height
+        drags = across & ~np.maximum.accumulate(airborne)
+        lands = ~across & ~airborne
+        return np.where(drags, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
 
     def check(self, scenario: Scenario) -> None:
         """Raise InfeasibleReference if the scenario exceeds a limit."""

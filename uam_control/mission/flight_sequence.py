@@ -359,7 +359,7 @@ class Mission:
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.end_mission = self._over
         seen.off_path = planned = guidance.planned
-        seen.landing_due = time >= landing.at and not planned
+        seen.landing_due = time >= landing.at and not planned and guidance.goes_on
         seen.arrived = planned and guidance.arrived(stamp)
         half = landing.at + 0.5 * landing.duration
         if time >= half or touchdown.late_in_descent(stamp):
@@ -477,4 +477,7 @@ class Mission:
         given = self._override.value(desired)
         if given is not None:
             return given
-        return desired and decision.keep_magnet and self.output.grasp is not Grasp.GIVEN_UP
+        if decision.guide is Guide.DESCEND and self.output.grasp is Grasp.APPROACHED:
+            return False  # a payload that is not lifted yet: the arm would pull on its stand
+        left = self.output.grasp in (Grasp.GIVEN_UP, Grasp.ABSENT)
+        return desired and decision.keep_magnet and not left

@@ -36,6 +36,7 @@ from uam_control.mission.motion.trajectory import Trajectory, empty_motion
 from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan, still
 from uam_control.mission.scenarios.route import SINK
 
+PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
 STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a scenario time that passes as the stamps do
 
 
@@ -265,7 +266,12 @@ class Guidance:
         No effect while the path is left, or about to go on after a stop.
         """
         if rate != self._clock.goal and not self._plans and not self.coming_back:
-            self._clock.change(stamp, rate, self._ramp_length())
+            self._clock.change(stamp, rate, self._ramp_length(PACE_TIME))
+
+    @property
+    def goes_on(self) -> bool:
+        """Return whether the scenario's clock runs on, or is about to: no grasp stops it."""
+        return self._clock.goal == 1.0
 
     @property
     def coming_back(self) -> bool:
@@ -492,8 +498,12 @@ class Guidance:
         peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
         return max(p.stop_time, PEAK * float(np.max(back / peak)))
 
-    def _ramp_length(self) -> float:
-        """Return the time [s] to stop or to resume within stop_acceleration."""
+    def _ramp_length(self, shortest: float = math.inf) -> float:
+        """Return the time [s] to stop or to resume within stop_acceleration.
+
+        shortest [s]: in place of a longer stop_time.
+        """
         self._trajectory.write(self.scenario_time, self._path)
         speed = float(np.linalg.norm(self._path[CHI_DOT, POSITION]))
-        return max(self.parameters.stop_time, RAMP * speed / self.parameters.stop_acceleration)
+        shortest = min(shortest, self.parameters.stop_time)
+        return max(shortest, RAMP * speed / self.parameters.stop_acceleration)

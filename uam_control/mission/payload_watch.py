@@ -22,21 +22,24 @@ PERIOD = 0.02  # [s] between two steps of the executive
 class WithoutDescent:
     """A trajectory that stays at the height of a window's begin until the end of its climb."""
 
-    def __init__(self, trajectory: Trajectory, window: GraspWindow, like: np.ndarray) -> None:
-        """like (5, 6 + n): a motion of the same size."""
+    def __init__(
+        self, trajectory: Trajectory, window: GraspWindow, time: float, like: np.ndarray
+    ) -> None:
+        """time [s]: of the scenario now; like (5, 6 + n): a motion of the same size."""
         self._inner, self._window = trajectory, window
+        self._begin = begin = min(max(window.descent, time), window.lifted - 1e-3)
         self._level = np.zeros_like(like)
         ends = []
-        for time in (window.descent, window.lifted):
-            trajectory.write(time, self._level)
+        for at in (begin, window.lifted):
+            trajectory.write(at, self._level)
             ends.append(self._level[CHI].copy())
-        move = Move("z", window.descent, window.lifted, float(ends[1][Z]))
+        move = Move("z", begin, window.lifted, float(ends[1][Z]))
         self._between = Moves(ends[0], [move])
 
     def write(self, time: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n); see `Trajectory.write`."""
         self._inner.write(time, motion)
-        if self._window.descent < time < self._window.lifted:
+        if self._begin < time < self._window.lifted:
             self._between.write(time, self._level)
             motion[:, Z] = self._level[:, Z]
 
@@ -96,7 +99,8 @@ class PayloadWatch:
         window = directive.without_descent
         if window is not None and window is not self._left_out:
             self._left_out = window
-            guidance.replace(WithoutDescent(guidance.trajectory, window, guidance.motion))
+            now, motion = guidance.scenario_time, guidance.motion
+            guidance.replace(WithoutDescent(guidance.trajectory, window, now, motion))
         return directive.land
 
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:

@@ -22,6 +22,7 @@ from uam_control.vehicle.plant_numbers import check_plant_numbers
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
+LONGEST_PERIOD = 0.01  # [s] of a tick: the attitude loop oscillates with longer ones
 LEAST_RANGE = 0.1  # [rad] to either side of 0, because the supervisor's limits are symmetric
 
 
@@ -53,7 +54,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         model=model,
         mass=top.positive("mass"),
         gravity=top.positive("gravity"),
-        control_period=top.positive("control_period"),
+        control_period=_control_period(top),
         rotor=_rotor_model(rotor),
         rotors=tuple(_rotor(entry) for entry in rotor.entries("layout")),
         servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
@@ -69,6 +70,13 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     _check_servo(described.servo, servo)
     check_plant_numbers(top)
     return described
+
+
+def _control_period(top: Section) -> float:
+    period = top.positive("control_period")
+    if period > LONGEST_PERIOD:
+        raise top.error("control_period", f"{period:g} s is above {LONGEST_PERIOD:g} s")
+    return period
 
 
 def _autopilot_gains(top: Section) -> dict[str, float]:

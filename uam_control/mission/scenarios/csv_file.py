@@ -119,7 +119,8 @@ class _Table:
 
     def error(self, row: int, column: str, text: str) -> ScenarioError:
         """Return the error of a row, counted from 0."""
-        return ScenarioError(f"{self.file} line {row + 2} column {self._written[column]}: {text}")
+        name = self._written.get(column, column)  # a column that the file may leave out
+        return ScenarioError(f"{self.file} line {row + 2} column {name}: {text}")
 
     def _column(self, name: str) -> np.ndarray:
         return self._numbers[:, self._names.index(name)]
