@@ -1,12 +1,18 @@
 """A restarted node receives the parameters that were changed in flight."""
 
+import os
+
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_lab.flight.ros.restarts import ChangedParameters
+from uam_lab.flight.ros.status_listener import StatusListener
+from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.status import MissionStatus
 
 
 class Silent:
@@ -54,3 +60,34 @@ def test_the_newest_accepted_values_come_back_as_ros_arguments(namespace, tmp_pa
         "K": 4,
     }
     assert found["rho_0"].type_ == Parameter.Type.DOUBLE
+
+
+def test_a_message_of_something_else_is_skipped_and_said_once(probe, domain, capfd):
+    change = ParameterChange("mission", "x", {"tilt_hold": (0.8, 0.7)}).to_message(1)
+    good = {topics.CHANGES: change, topics.MISSION_STATUS: MissionStatus().to_message(1)}
+    names = [f"/{topic.name}" for topic in (*good, topics.AUTOPILOT_STATE)]
+    said = []
+    with StatusListener(os.environ, domain, publishers="any") as listener:
+        changed = ChangedParameters(listener.node)
+        publishers = {topic: probe.publisher(topic) for topic in (*good, topics.AUTOPILOT_STATE)}
+
+        def all_said():
+            for publisher in publishers.values():
+                publisher.publish(DiagnosticArray())
+            changed.poll()
+            assert listener.poll() == []
+            said.append(capfd.readouterr().err)
+            return all(f"{name}: messages that" in "".join(said) for name in names)
+
+        def received():
+            changed.poll()
+            listener.poll()
+            return listener.newest and changed.arguments("mission")
+
+        probe.until(all_said, "a line for each topic")
+        all_said()
+        for topic, message in good.items():
+            publishers[topic].publish(message)
+        probe.until(received, "the good messages")
+    for name in names:
+        assert "".join(said).count(f"{name}: messages that cannot be read are skipped") == 1

@@ -2,17 +2,20 @@
 
 import time
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import BatteryState, Temperature
 from std_msgs.msg import Header
 from vehicle_rig import PERIOD, Vehicle, take_off
 
+from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import checklist_message
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 
 @pytest.fixture
@@ -123,7 +126,13 @@ def test_states_that_stop_in_flight_hand_over_to_the_autopilots_failsafe(start, 
     made.node = node
     made.fly(1)
     take_off(made)
-    made.until(lambda status: status.state == "failsafe")
+    further = TrajectoryWriter(coordinates(3))  # of another vehicle: no states
+
+    def failed():
+        made.states.publish(further.fill(made.stamp, np.zeros((3, 9))))
+        return made.status.state == "failsafe"
+
+    probe.until(failed, "the failsafe")
     assert made.status.cause.startswith("no state of the estimator for 3.")
     made.fly(1)  # a state that comes back changes nothing
     assert made.status.state == "failsafe"

@@ -1,17 +1,21 @@
 """Services of several nodes of one process are answered, one request per check."""
 
 from contextlib import contextmanager
+from functools import partial
 
 import pytest
 import rclpy
-from rcl_interfaces.srv import ListParameters
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import ListParameters, SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from uam_msgs_py.node import arrivals, other_entities
+from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.other_entities import OtherEntities
 
 NAMES = ("first", "second", "third")
+KINDS = (ListParameters, SetParameters, SetParametersAtomically, Trigger)
 
 
 def landing(_, response):
@@ -36,14 +40,15 @@ def served(*names):
         context.try_shutdown()
 
 
-def answer(probe, rest, kind, name):
-    """Return the answer of a service that `rest` serves."""
+def answer(probe, serve, request, name):
+    """Return the answer of a service that `serve()` serves."""
+    kind = next(one for one in KINDS if isinstance(request, one.Request))
     client = probe.node.create_client(kind, name)
     probe.until(client.service_is_ready, name)
-    future = client.call_async(kind.Request())
+    future = client.call_async(request)
 
     def answered():
-        rest.serve(0)
+        serve()
         return future.done()
 
     probe.until(answered, f"answer of {name}")
@@ -52,10 +57,11 @@ def answer(probe, rest, kind, name):
 
 def test_the_services_of_every_node_are_answered(probe):
     with served(*NAMES) as (_, rest):
+        serve = partial(rest.serve, 0)
         for name in (*NAMES, *NAMES):
-            parameters = answer(probe, rest, ListParameters, f"{name}/list_parameters")
+            parameters = answer(probe, serve, ListParameters.Request(), f"{name}/list_parameters")
             assert "use_sim_time" in parameters.result.names
-            assert answer(probe, rest, Trigger, "land").message == "landing"
+            assert answer(probe, serve, Trigger.Request(), "land").message == "landing"
 
 
 @pytest.mark.parametrize("told", [True, False], ids=["told of requests", "asking all"])
@@ -69,8 +75,8 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
         asked.append(service)
         return answer_it(service)
 
-    answer_it = other_entities._answered
-    monkeypatch.setattr(other_entities, "_answered", answered)
+    answer_it = other_entities.answered
+    monkeypatch.setattr(other_entities, "answered", answered)
     with served("quiet") as (nodes, rest):
         services = len(list(nodes[0].services))
         rest.serve(0)
@@ -96,4 +102,21 @@ def test_a_request_that_nobody_told_of_is_answered_within_a_second_or_two(probe,
     monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.OK)
     with served("untold") as (_, rest):
         rest.serve(0)
-        assert answer(probe, rest, Trigger, "land").message == "landing"
+        assert answer(probe, partial(rest.serve, 0), Trigger.Request(), "land").message == "landing"
+
+
+@pytest.mark.parametrize("name", ["set_parameters", "set_parameters_atomically"])
+@pytest.mark.parametrize("by_rclpy", [False, True], ids=["between two ticks", "by rclpy"])
+def test_a_parameter_of_an_unknown_type_ends_no_node(probe, name, by_rclpy, capfd):
+    kind = {"set_parameters": SetParameters}.get(name, SetParametersAtomically)
+    unknown = Parameter(name="use_sim_time", value=ParameterValue(type=42))
+    request = kind.Request(parameters=[unknown])
+    with served("asked") as (nodes, rest):
+        executor = ServingExecutor(context=nodes[0].context)
+        executor.add_node(nodes[0])
+        serve = partial(executor.spin_once, 0.0) if by_rclpy else partial(rest.serve, 0)
+        result = answer(probe, serve, request, f"asked/{name}")
+        assert result == kind.Response(), "nothing was set"
+        assert f"/asked/{name}: request refused: ValueError" in capfd.readouterr().err
+        assert answer(probe, serve, Trigger.Request(), "land").message == "landing"
+        executor.shutdown()

@@ -96,12 +96,12 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     vehicle.fly(2)
     assert vehicle.status.phase != "goal" and vehicle.status.state == "flying"
 
-    text = answer(vehicle, topics.GOAL_POSE, goal(0.3, 0.0, 1.0, 0.3))
+    text = answer(vehicle, topics.GOAL_POSE, goal(0.3, 0.0, 1.0, 0.4))
     assert text.startswith("accepted: at the end in ")
     vehicle.fly(2)
     vehicle.until(lambda status: status.phase == "goal")
     vehicle.until_state("holding")
-    np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.3, 0.0, 1.0, 0.3], atol=1e-9)
+    np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.3, 0.0, 1.0, 0.4], atol=1e-9)
     end = vehicle.path[-1].poses[-1].pose.position
     assert vehicle.path[-1].header.frame_id == "world"
     assert (end.x, end.y, end.z) == pytest.approx((0.3, 0.0, 1.0))
@@ -110,7 +110,7 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     assert answer(vehicle, topics.GOAL_POSE, goal(0.2, 0.0, 0.0)).startswith("accepted")
     vehicle.until_state("flying")
     vehicle.until_state("holding")
-    np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.2, 0.0, 1.0, 0.3], atol=1e-9)
+    np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.2, 0.0, 1.0, 0.4], atol=1e-9)
 
     names, angles = ["joint_2", "joint_1"], vehicle.state[0, 6:]
     text = answer(vehicle, topics.ARM_TRAJECTORY, arm_trajectory(names, (1, 0.0, 0.0)))
@@ -118,17 +118,17 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     arm = arm_trajectory(names[::-1], (0, angles[1], angles[0]), (2, 1.2, 0.2), velocities=True)
     line = base_trajectory((0, 0.2, 0.0, 1.0), (2, 0.5, 0.0, 1.1))
     assert answer(vehicle, topics.BASE_TRAJECTORY, line).startswith(
-        "refused: the first point is 0.30 rad"
+        "refused: the first point is 0.40 rad"
     )
     for point in line.points:
         turn = point.transforms[0].rotation
-        turn.w, turn.z = math.cos(0.15), math.sin(0.15)
+        turn.w, turn.z = math.cos(0.2), math.sin(0.2)
     assert answer(vehicle, topics.ARM_TRAJECTORY, arm).startswith("accepted")
     assert answer(vehicle, topics.BASE_TRAJECTORY, line).startswith("accepted")
     vehicle.until_state("flying")
     vehicle.until_state("holding")
     found = vehicle.state[0, [0, 1, 2, 5, 6, 7]]
-    np.testing.assert_allclose(found, [0.5, 0.0, 1.1, 0.3, 0.2, 1.2], atol=1e-9)
+    np.testing.assert_allclose(found, [0.5, 0.0, 1.1, 0.4, 0.2, 1.2], atol=1e-9)
     assert vehicle.ask("land")[0]
     vehicle.until_state("landing")
     assert answer(vehicle, topics.GOAL_POSE, goal(0.0, 0.0, 1.0)) == "refused: not while landing"

@@ -1,10 +1,13 @@
 """Who may publish, over ROS: early impostors, configured names, messages that cannot be used."""
 
 import signal
+import time
 
 import numpy as np
 import pytest
+import rclpy
 from rclpy.node import Node
+from std_msgs.msg import Bool
 
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
@@ -13,7 +16,9 @@ from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.status import ERROR
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node import polling, sole_publisher
 from uam_msgs_py.node.connections import READERS, Connections
+from uam_msgs_py.node.rightful import Rightful
 
 PERIOD = 4_000_000
 NAMES = coordinates(2)
@@ -57,6 +62,40 @@ def node_named(probe):
     yield make
     for node in made:
         node.destroy_node()
+
+
+class OfMission:
+    """A process with a node `mission` that publishes a rare and a frequent topic."""
+
+    def __init__(self):
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        node = Node("mission", context=self.context)
+        self.rare, self.frequent = (
+            node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (topics.ARMING, topics.REFERENCE)
+        )
+
+
+@pytest.fixture
+def missions():
+    """Two processes of one node name."""
+    made = OfMission(), OfMission()
+    yield made
+    for one in made:
+        one.context.shutdown()
+
+
+class Guarded:
+    """A topic of the mission as another node reads it."""
+
+    def __init__(self, probe, topic):
+        self.inlet = polling.listen(probe.node, topic, topic.reading, raw=True)
+        rightful = Rightful("/mission", only=True)
+        self.guard = sole_publisher.SolePublisher(probe.node, self.inlet, rightful, lambda: True)
+
+    def read(self):
+        return len(list(polling.messages(self.inlet, self.guard)))
 
 
 class Diagnostics:
@@ -125,6 +164,54 @@ def test_messages_of_an_impostor_do_not_replace_those_of_the_rightful_node(
     assert stamp_of(references[-1]) == rightful.stamp + PERIOD
 
 
+def test_a_second_node_of_the_name_takes_over_rare_topics_only_from_a_silent_process(
+    probe, missions
+):
+    first, second = missions
+    rare, frequent = (Guarded(probe, topic) for topic in (topics.ARMING, topics.REFERENCE))
+    reference = TrajectoryWriter(NAMES).fill(PERIOD, np.zeros((3, 8)))
+
+    def arrives(guarded, publisher, message):
+        def read():
+            publisher.publish(message)
+            return guarded.read()
+
+        probe.until(read, "a message of the rightful node")
+
+    def second_is_obeyed():
+        before = sum(rare.guard.refused.values())
+        second.rare.publish(Bool())
+        taken = []
+
+        def decided():
+            taken.append(rare.read())
+            return taken[-1] or sum(rare.guard.refused.values()) > before
+
+        probe.until(decided, "a message of the second node")
+        return bool(taken[-1])
+
+    arrives(rare, first.rare, Bool(data=True))
+    probe.until(lambda: len(sole_publisher.publishers(probe.node, "/uam/arming")) == 2, "both")
+    time.sleep(0.3)  # a killed controller is not waited for that long
+    assert not second_is_obeyed()
+    for _ in range(sole_publisher.MANY):
+        arrives(frequent, first.frequent, reference)
+    assert not second_is_obeyed()
+    time.sleep(0.3)
+    assert second_is_obeyed()
+
+
+def test_a_process_of_which_only_rare_messages_are_read_may_be_silent_for_longer():
+    life = sole_publisher.Life()
+    for k in range(20):
+        life.heard(k * 500_000_000)
+    assert not life.silent(19 * 500_000_000 + sole_publisher.RARE_SILENT)
+    assert life.silent(19 * 500_000_000 + sole_publisher.RARE_SILENT + 1)
+    for k in range(sole_publisher.MANY):
+        life.heard(60_000_000_000 + k * PERIOD)
+    assert life.silent(60_000_000_000 + sole_publisher.MANY * PERIOD + sole_publisher.SILENT)
+
+
 def test_a_configured_node_is_the_rightful_one(start, probe, node_named):
     magnet = probe.collect(topics.MAGNET)
     mission = start(MODULE, publishers="state_estimator=probe")
@@ -154,10 +241,13 @@ def test_unusable_messages_of_the_rightful_node_are_named_and_the_next_good_one_
     infinite[1, 2] = np.nan
     swapped = TrajectoryWriter([*NAMES[:6], NAMES[7], NAMES[6]])
     unknown = TrajectoryWriter([*NAMES[:7], "elbow"])
+    names = coordinates(3)
+    further = {"values": np.zeros((3, len(names))), "writer": TrajectoryWriter(names)}
     for bad, reason in (
         ({"values": infinite}, "velocities of z is nan"),
         ({"writer": swapped}, "expected x, y, z, roll, pitch, yaw, alpha_1, alpha_2"),
         ({"writer": unknown}, "joint names x, y, z, roll, pitch, yaw, alpha_1, elbow"),
+        (further, "alpha_3; expected x, y, z, roll, pitch, yaw, alpha_1, alpha_2"),
     ):
         states.send(**bad)
         sender = "/uam/state: refused /probe ("

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import rclpy
 import yaml
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -24,6 +25,7 @@ from uam_msgs_py.messages.convert import read_joints
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.tunable import TunableNode
 
 COORDINATES = coordinates(2)
 PERIOD, ADAPTATION_PERIOD = 4_000_000, 20_000_000  # [ns]
@@ -156,6 +158,17 @@ def test_a_check_changes_and_publishes_nothing(flying, probe):
     assert not set_atomically(probe, POSITION, "check_parameters", varpi=-0.2).successful
     assert get(probe, POSITION, "varpi") == [load_profile("s500").sets[POSITION].varpi]
     assert flying.changes == []
+
+
+def test_a_check_does_not_begin_simulated_time(domain):
+    rclpy.init()
+    try:
+        node = TunableNode("checked")
+        assert node.check_parameters([Parameter("use_sim_time", value=True)]).successful
+        assert not node.get_clock().ros_time_is_active
+        node.destroy_node()
+    finally:
+        rclpy.shutdown()
 
 
 @pytest.mark.parametrize("node", NODES)

@@ -216,6 +216,18 @@ def test_reference_contains_only_controlled_coordinates(values, flying):
     np.testing.assert_array_equal(reference.values[:, :6], values[:, :6] if flying else 0.0)
 
 
+@pytest.mark.parametrize("joints", [1, 3])
+def test_a_message_for_another_number_of_joints_is_refused(joints):
+    state = np.zeros((3, 6 + joints))
+    good = TrajectoryWriter(coordinates(joints)).fill(4, state)
+    assert read_state(good, joints)[1].shape == state.shape
+    with pytest.raises(BadMessage, match="expected x, .*alpha_2"):
+        read_state(good, 2)
+    for flying in (False, True):
+        with pytest.raises(BadMessage, match="expected .*alpha_2"):
+            read_reference(ReferenceWriter(joints).fill(4, state, flying, 0), 2)
+
+
 def test_position_command_round_trip():
     reference = np.arange(24.0).reshape(3, 8)
     attitude, tau = -np.arange(9.0).reshape(3, 3), np.array([1.0, 2.0, 22.0])

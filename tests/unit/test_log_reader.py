@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from default_columns import COLUMNS
+from diagnostic_msgs.msg import DiagnosticArray
 from logged_flight import vehicles_log
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Bool
@@ -24,6 +25,7 @@ from uam_lab.recording.message_definitions import schema
 from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.node.namespace import expanded
 
@@ -237,3 +239,13 @@ def test_arming_is_commanded_unless_the_log_says_that_it_never_was(commands, com
     topic, found = topics.ARMING, TopicLog("std_msgs/msg/Bool")
     found.messages = [serialize_message(Bool(data=one)) for one in commands]
     assert Log({f"/{topic.name}": found}).arming_commanded is commanded
+
+
+def test_a_message_of_something_else_is_left_out_with_a_note():
+    topic, found = topics.CHANGES, TopicLog("diagnostic_msgs/msg/DiagnosticArray")
+    change = ParameterChange("mission", "x", {"tilt_hold": (0.8, 0.7)}).to_message(SECOND)
+    found.messages = [serialize_message(one) for one in (DiagnosticArray(), change)]
+    log = Log({f"/{topic.name}": found})
+    (entry,) = log_reader.parameter_changes(log, 0)
+    assert (entry["node"], entry["time_s"]) == ("mission", 1.0)
+    assert log.notes == [f"{topic.name}: 1 messages cannot be read; left out"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from io import StringIO
+from unittest.mock import Mock
 
 import pytest
 
@@ -17,7 +18,7 @@ from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus
 from uam_lab.flight.progress import Progress, device_table
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.result_folder import ResultFolder
-from uam_lab.vehicle import vehicle_nodes
+from uam_lab.vehicle import vehicle_engine, vehicle_nodes
 from uam_lab.vehicle.devices import Report, devices
 from uam_lab.vehicle.lab import Magnet
 from uam_lab.vehicle.lab_file import load_lab, template
@@ -262,3 +263,11 @@ def test_wrong_use_is_refused_in_one_line(capsys, tmp_path):
     assert main(["vehicle", "--config", str(tmp_path / "lab.yaml")]) == 2
     assert "room.x: 2 is not below -2" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [tmp_path / "lab.yaml"]
+
+
+def test_the_flight_of_a_vehicle_continues_without_recorder_and_cockpit(tmp_path):
+    children = Mock()
+    vehicle_engine.start_nodes(children, LAB, settings_of(LAB), ResultFolder(tmp_path), "")
+    started = children.start.call_args_list
+    optional = {call.args[0] for call in started if call.kwargs["optional"]}
+    assert optional == {"recorder", "cockpit"}

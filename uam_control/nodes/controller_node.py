@@ -41,12 +41,6 @@ RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
 class ControllerNode(UamNode):
     """Node with one adaptive law; it runs once per stamp, after the last input of the stamp."""
 
-    READERS = {
-        topics.STATE.name: read_state,
-        topics.REFERENCE.name: read_reference,
-        topics.POSITION_COMMAND.name: read_position_command,
-    }
-
     def __init__(
         self,
         name: str,
@@ -82,8 +76,14 @@ class ControllerNode(UamNode):
         self._join = StampJoin(names, self._joined, ahead=ahead)
         self.joins.append(self._join)
         self.triggers = (last.name,)
+        joints = len(self.vehicle.joints)
+        readers = {
+            topics.STATE: lambda data: read_state(data, joints),
+            topics.REFERENCE: lambda data: read_reference(data, joints),
+            topics.POSITION_COMMAND: read_position_command,
+        }
         for topic in inputs:
-            self.listen(topic, partial(self._add, topic.name, self.READERS[topic.name]))
+            self.listen(topic, partial(self._add, topic.name, readers[topic]))
         self.create_service(Trigger, f"~/{RESET}", self._on_reset)
         self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
 

@@ -123,7 +123,8 @@ class MissionNode(UamNode):
         self._preflight = self.publisher(topics.PREFLIGHT)
         self._path = self.publisher(topics.PATH)
         self._path_of = ""  # the plan that was published, see _publish_path
-        self._writer = ReferenceWriter(len(vehicle.joints))
+        self._joints = len(vehicle.joints)
+        self._writer = ReferenceWriter(self._joints)
         self._errors = TrackingErrors(self)
         MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
@@ -181,8 +182,8 @@ class MissionNode(UamNode):
         self._mission.checklist(report)
 
     def _on_state(self, data: bytes) -> None:
+        self._states.put(read_state(data, self._joints))
         self._state_at = time.monotonic()
-        self._states.put(read_state(data))
         if not self.deferred:
             self.settle()
 

@@ -11,7 +11,6 @@ trajectories were answered) with `answer` (the newest) in the mission status.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from uam_control.mission import Mission
 from uam_control.mission.plans import GoalPose, Points
@@ -34,10 +33,10 @@ class PlannerInputs:
         self._take(topics.BASE_TRAJECTORY, read_base_trajectory)
         self._take(topics.ARM_TRAJECTORY, lambda data: read_arm_trajectory(data, joints))
 
-    def _take(self, topic: topics.Topic, read: Callable[[Any], GoalPose | Points]) -> None:
-        def handle(message: Any) -> None:
+    def _take(self, topic: topics.Topic, read: Callable[[bytes], GoalPose | Points]) -> None:
+        def handle(data: bytes) -> None:
             try:
-                accepted, text = self._mission.plan(read(message))
+                accepted, text = self._mission.plan(read(data))
             except BadMessage as error:
                 accepted, text = False, f"refused: {error}"
             self.answers, self.answer = self.answers + 1, f"{topic.name}: {text}"
@@ -49,4 +48,4 @@ class PlannerInputs:
                 log.warning(self.answer)
             self._publish()
 
-        self._node.listen(topic, handle, required=False, qos=topic.qos)
+        self._node.listen(topic, handle, required=False, qos=topic.qos, raw=True)

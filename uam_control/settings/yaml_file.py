@@ -27,12 +27,17 @@ for _loader in (_Loader, _FastLoader):
     )
 
 
+def parsed(text: str) -> Any:
+    """Return the content of a text. Raises yaml.YAMLError."""
+    return yaml.load(text, _FastLoader)  # noqa: S506 (a SafeLoader)
+
+
 def read(file: Path, error: type[ValueError]) -> Any:
     """Return the content of the file; raise `error` with one line: file, place, error."""
     try:
         text = file.read_text()
         try:
-            return yaml.load(text, _FastLoader)  # noqa: S506 (a SafeLoader)
+            return parsed(text)
         except yaml.YAMLError:
             return yaml.load(text, _Loader)  # noqa: S506 (a SafeLoader)
     except OSError as reason:

@@ -7,7 +7,6 @@ mission starts with `require_checklist` only when all items have passed.
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,9 +15,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from rcl_interfaces.srv import GetParameters
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.nodes.described import described_vehicle
@@ -46,8 +43,9 @@ from uam_msgs_py.messages.checklist import (
 )
 from uam_msgs_py.messages.status import OK, WARN, ChecklistState, diagnostic
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.namespace import adopt_sections, label
+from uam_msgs_py.node.answering import ServingExecutor
+from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.namespace import label
 from uam_msgs_py.node.node_parameters import NodeParameters, plain, refuse_unknown
 from uam_msgs_py.node.rightful import rightful_nodes
 
@@ -272,10 +270,10 @@ class ChecklistNode:
 
 def main() -> int:
     """Run the checklist until SIGINT or SIGTERM; return the exit status."""
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
-    node = Node(NAME)
-    adopt_sections(node)
+    node = begin(NAME)
+    if node is None:
+        return REFUSED
     try:
         options = NodeParameters(node, ChecklistOptions, read_only=True).current
         limits = NodeParameters(node, ChecklistParameters)
@@ -285,7 +283,7 @@ def main() -> int:
         refuse_unknown(node)
     except ParameterError as error:
         return refuse(NAME, error)
-    executor = SingleThreadedExecutor()
+    executor = ServingExecutor()
     executor.add_node(node)
     while not stop.raised:
         end = time.monotonic() + POLL_PERIOD

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass
 
 import rclpy
 import yaml
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
@@ -22,8 +19,8 @@ from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
-from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.namespace import adopt_sections
+from uam_msgs_py.node.answering import ServingExecutor
+from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.rightful import rightful_nodes
 
@@ -44,10 +41,10 @@ class CockpitParameters(ParameterSet):
 
 def main() -> int:
     """Serve the page until SIGINT or SIGTERM; return the exit status."""
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
-    node = Node(NAME)
-    adopt_sections(node)
+    node = begin(NAME)
+    if node is None:
+        return REFUSED
     options = yaml.safe_load(configuration.path(OPTIONS).read_text())
     try:
         served = NodeParameters(node, CockpitParameters, read_only=True).current
@@ -59,7 +56,7 @@ def main() -> int:
     except (ParameterError, AddressError) as error:
         return refuse(NAME, error)
     print(f"{NAME}: {web.url(server)}", flush=True)
-    executor = SingleThreadedExecutor()
+    executor = ServingExecutor()
     executor.add_node(node)
     # not spun: an executor would take the messages that the page polls
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)

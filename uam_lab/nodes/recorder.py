@@ -7,7 +7,6 @@ A log is never overwritten.
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,9 +15,7 @@ from pathlib import Path
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from uam_control.settings.parameter_set import (
@@ -37,9 +34,10 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import connections, process_options
-from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, refuse
+from uam_msgs_py.node.answering import ServingExecutor
+from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.health import LoopTime, ages
-from uam_msgs_py.node.namespace import adopt_sections, label
+from uam_msgs_py.node.namespace import label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 
@@ -171,10 +169,10 @@ def main() -> int:
     2: bad parameters, a file that exists or cannot be written, in one line.
     """
     # the signal must not close the ROS context: received messages are still to be written
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
-    node = Node(NAME)
-    adopt_sections(node)
+    node = begin(NAME)
+    if node is None:
+        return REFUSED
     log = node.get_logger()
     try:
         options = NodeParameters(node, RecorderParameters, read_only=True).current
@@ -188,7 +186,7 @@ def main() -> int:
         topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
     )
     progress = Progress(node)
-    services = SingleThreadedExecutor()
+    services = ServingExecutor()
     services.add_node(node)
     polls_per_flush = max(1, round(options.flush_period / options.poll_period))
     polls, loop, ended = 0, LoopTime(), ""

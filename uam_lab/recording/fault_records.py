@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
-
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages.fault_events import FaultEvent
 from uam_sim_bridge.faults.timeline import record
 
 
-def records(messages: Iterable[bytes], takeoff: int) -> list[dict[str, Any]]:
-    """Return the faults of a log, see `timeline.record`; takeoff: stamp [ns] of mission time 0."""
+def records(events: Iterable[tuple[int, FaultEvent]], takeoff: int) -> list[dict[str, Any]]:
+    """Return the faults of a log, see `timeline.record`.
+
+    events: with their stamps [ns]; takeoff: stamp [ns] of mission time 0.
+    """
     found: dict[tuple[str, int], dict[str, Any]] = {}
-    for data in messages:
-        stamp, event = FaultEvent.from_message(deserialize_message(data, DiagnosticArray))
+    for stamp, event in events:
         time, key = (stamp - takeoff) / SECOND, (event.place, event.number)
         if event.active:
             found[key] = record(event.name, time, None, event.parameters)

@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
@@ -33,6 +31,7 @@ from uam_lab.results import timeseries
 from uam_lab.results.outcome import Outcome, grasp_decision, transition
 from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.fault_events import FaultEvent
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 from uam_sim_bridge.nodes.latencies import DEADLINE_TICKS
@@ -145,7 +144,7 @@ def read_flight(
         raise UnreadableLog(f"{path} has no control tick")
     state = log.samples(topics.STATE, STATE_ROWS, columns.size)
     ticks = every[~withheld(log, every, state.stamps, references.samples.stamps)]
-    notes = [*log.notes]
+    notes = []
     if len(ticks) < len(every):
         text = f"table and errors have {len(ticks)} of {len(every)} ticks"
         notes.append(f"{text}: the log has no state and no reference of the others (inner_rate)")
@@ -175,12 +174,12 @@ def read_flight(
     changes = parameter_changes(log, takeoff)
     entered = transitions(statuses, takeoff)
     wall = log.wall_seconds(states)
-    faults = fault_log.records(log.messages(topics.FAULTS), takeoff)
+    faults = fault_log.records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
     series = recording.series(info)
     decided = grasps(statuses, takeoff)
     ended = end is not None
     events = changes, entered, decided, faults
-    found = LoggedFlight(series, ended, abort_reason, *events, wall, notes)
+    found = LoggedFlight(series, ended, abort_reason, *events, wall, [*log.notes, *notes])
     if simulated:
         return found
     period = vehicle.control_period
@@ -214,8 +213,7 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
     `ParameterChange`.
     """
     found = []
-    for data in log.messages(topics.CHANGES):
-        stamp, change = ParameterChange.from_message(deserialize_message(data, DiagnosticArray))
+    for stamp, change in log.diagnostics(topics.CHANGES, ParameterChange.from_message):
         entry = {
             "time_s": (stamp - takeoff) / SECOND,
             "node": change.node,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -31,6 +33,8 @@ TOPICS = (
     *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
     *(topics.SETPOINT, topics.THRUST, topics.PAYLOAD, *ADAPTATION.values()),
 )
+
+T = TypeVar("T")
 
 
 class StampedRows:
@@ -60,7 +64,7 @@ class Log:
     def __init__(
         self, found: Mapping[str, TopicLog], namespace: str = "/", notes: Sequence[str] = ()
     ):
-        self.notes = notes
+        self.notes = [*notes]
         self._topics = {
             topic: found[name]
             for topic in TOPICS
@@ -137,10 +141,20 @@ class Log:
 
     def statuses(self) -> list[tuple[int, MissionStatus]]:
         """Return stamps [ns] and statuses of the mission, in order."""
-        return [
-            MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
-            for data in self.messages(topics.MISSION_STATUS)
-        ]
+        return self.diagnostics(topics.MISSION_STATUS, MissionStatus.from_message)
+
+    def diagnostics(self, topic: Topic, decode: Callable[[DiagnosticArray], T]) -> list[T]:
+        """Return the decoded messages of a topic of DiagnosticArray, in order.
+
+        Those that raise BadMessage are left out, with a note: anyone may have sent them.
+        """
+        found, logged = [], self.messages(topic)
+        for data in logged:
+            with suppress(BadMessage):
+                found.append(decode(deserialize_message(data, DiagnosticArray)))
+        if missing := len(logged) - len(found):
+            self.notes.append(f"{topic.name}: {missing} messages cannot be read; left out")
+        return found
 
 
 def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:

@@ -139,7 +139,9 @@ class _Rehearsal:
         def start(children: Processes) -> None:
             if self._start_laboratory(children, devices, publishers):
                 left_out = () if self._lists else (CHECKLIST,)
-                start_nodes(children, self._lab, self._settings, self._folder, publishers, left_out)
+                needed = self._lab, self._settings, self._folder, publishers
+                # a rehearsal is judged by its log
+                start_nodes(children, *needed, without=left_out, optional=(wiring.COCKPIT,))
 
         failure, _ = supervise.run(
             self._settings,

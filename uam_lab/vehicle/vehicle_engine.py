@@ -33,6 +33,7 @@ AGAIN = (
     *vehicle_nodes.DRIVERS,
     vehicle_nodes.CHECKLIST,
 )  # nodes that are restarted after a loss
+OPTIONAL = (COCKPIT, wiring.RECORDER)  # a vehicle in the air must not lose its control for a log
 NOTHING_FLOWN = "nothing was flown: the mission had no state of the estimator; the log is kept"
 
 
@@ -97,15 +98,19 @@ def start_nodes(
     folder: ResultFolder,
     publishers: str,
     without: Collection[str] = (),
+    optional: Collection[str] = OPTIONAL,
 ) -> None:
-    """Start the nodes of a vehicle except `without`; their parameters are in `folder`."""
+    """Start the nodes of a vehicle except `without`; their parameters are in `folder`.
+
+    optional: the flight continues without these.
+    """
     arguments = supervise.ros_arguments(settings, folder, publishers)
     for name, module in vehicle_nodes.processes(lab).items():
         if name in without:
             continue
         again = supervise.RESTARTS if name in AGAIN else 0
-        nodes = node_arguments.nodes_in(name, settings)
-        children.start(name, module, arguments, optional=name == COCKPIT, again=again, nodes=nodes)
+        nodes, missed = node_arguments.nodes_in(name, settings), name in optional
+        children.start(name, module, arguments, optional=missed, again=again, nodes=nodes)
 
 
 def _announcement(children: Processes, ports: Ports) -> Iterator[str]:

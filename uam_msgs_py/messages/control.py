@@ -49,10 +49,14 @@ def arm_alone(joints: int) -> TrajectoryReader:
 
 
 @read_once
-def read_state(data: bytes) -> tuple[int, np.ndarray]:
-    """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage."""
+def read_state(data: bytes, joints: int | None = None) -> tuple[int, np.ndarray]:
+    """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage.
+
+    joints: n of the vehicle, None for as many as the message has.
+    """
     message = Serialized(JointTrajectory, data)
-    return message.stamp, whole(len(message.layout.names) - ALPHA).read(message)
+    n = len(message.layout.names) - ALPHA if joints is None else joints
+    return message.stamp, whole(n).read(message)
 
 
 @dataclass(frozen=True)
@@ -79,14 +83,18 @@ class ReferenceWriter:
 
 
 @read_once
-def read_reference(data: bytes) -> tuple[int, Reference]:
-    """Return (stamp [ns], reference); raises BadMessage."""
+def read_reference(data: bytes, joints: int | None = None) -> tuple[int, Reference]:
+    """Return (stamp [ns], reference); raises BadMessage. joints: see `read_state`."""
     message = Serialized(JointTrajectory, data)
     names = message.layout.names
-    if names[:1] != ALONE:
-        return message.stamp, Reference(whole(len(names) - ALPHA).read(message), True)
-    values = np.zeros((3, ALPHA + len(names)))
-    values[:, ARM] = arm_alone(len(names)).read(message)
+    flying = names[:1] != ALONE
+    n = joints
+    if n is None:
+        n = len(names) - ALPHA if flying else len(names)
+    if flying:
+        return message.stamp, Reference(whole(n).read(message), True)
+    values = np.zeros((3, ALPHA + n))
+    values[:, ARM] = arm_alone(n).read(message)
     return message.stamp, Reference(values, False)
 
 

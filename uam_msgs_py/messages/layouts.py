@@ -21,6 +21,7 @@ from uam_control.stamps import SECOND
 ENCAPSULATION = 4
 STAMP = slice(4, 12)  # std_msgs/Header and rosgraph_msgs/Clock begin with it
 KNOWN_LAYOUTS = 32  # stored per message type
+MOST_NAMES = 1000  # of a message
 _STAMP = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
 
 
@@ -123,7 +124,10 @@ class Cursor:
 
     def names(self) -> None:
         """Read a sequence of strings, the names of the joints."""
-        self.layout.names = [self.string() for _ in range(self.count())]
+        count = self.count()
+        if count > MOST_NAMES:  # a million empty ones would take a second
+            raise BadMessage(f"{count} names, at most {MOST_NAMES} allowed")
+        self.layout.names = [self.string() for _ in range(count)]
 
     def first_point(self) -> None:
         """Read the number of points of a trajectory, and the first point."""

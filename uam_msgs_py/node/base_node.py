@@ -6,16 +6,18 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
@@ -28,7 +30,7 @@ from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.local_delivery import LocalDelivery, Outlet
-from uam_msgs_py.node.namespace import expanded, label
+from uam_msgs_py.node.namespace import adopt_sections, expanded, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
@@ -39,7 +41,10 @@ from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
 END_PATIENCE = 6.0  # s, for the middleware at a node's end; `uam fly` waits 10 s
+REFUSED = 2  # exit status
 LOG_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
+
+N = TypeVar("N", bound=Node)
 
 
 class UamNode(TunableNode):
@@ -103,11 +108,13 @@ class UamNode(TunableNode):
         handle: Callable[[Any], None],
         required: bool = True,
         qos: QoSProfile | None = None,
+        raw: bool = False,
     ) -> Subscription:
         """Call `handle(message)` for each message; if it raises BadMessage, `refuse` it.
 
-        The message is serialized if uam_msgs_py.messages.serialized reads its type. required: the
-        node reports that it waits while no message arrives. qos: None for `Topic.reading`.
+        The message is serialized if `raw`, or if uam_msgs_py.messages.serialized reads its type.
+        required: the node reports that it waits while no message arrives. qos: None for
+        `Topic.reading`.
         """
         counts, arrivals, name = self._counts, self._arrivals, topic.name
         counts[name] = 0
@@ -127,7 +134,8 @@ class UamNode(TunableNode):
             counts[name] += 1
             arrivals[name] = time.monotonic()
 
-        made = self._inlets[name] = self._subscription(topic, callback, qos or topic.reading)
+        raw = raw or stays_serialized(topic.type)
+        made = self._inlets[name] = self._subscription(topic, callback, qos or topic.reading, raw)
         if name in PUBLISHERS:
             rightful = self.rightful.of(name)
             self.sole_publishers[made] = SolePublisher(self, made, rightful, lambda: self.ticks > 0)
@@ -137,9 +145,9 @@ class UamNode(TunableNode):
         return made
 
     def _subscription(
-        self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile
+        self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile, raw: bool
     ) -> Subscription:
-        kind, name, raw = topic.type, topic.name, stays_serialized(topic.type)
+        kind, name = topic.type, topic.name
         if self._delivery is None:
             return self.create_subscription(kind, name, callback, qos, raw=raw)
         return self.create_subscription(
@@ -326,11 +334,8 @@ def run_together(
     two ticks, fifty times a second. The first node has the options of the process.
     """
     stop = StopSignal()
-    try:
-        # no handlers of rclpy: the context must still send the node's last messages
-        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:  # rclpy's own classes for a bad parameter file or argument
-        return refuse(name, error)
+    if not _initialized(name):
+        return REFUSED
     nodes: Sequence[UamNode] = ()
     try:
         try:
@@ -358,12 +363,39 @@ def run_together(
         faulthandler.cancel_dump_traceback_later()
 
 
+def begin(name: str, kind: type[N] = Node) -> N | None:
+    """Create the node of a process that does not `run` one.
+
+    None: bad arguments or parameter files, after one line on stderr; the exit status is REFUSED.
+    """
+    if not _initialized(name):
+        return None
+    try:
+        node = kind(name)
+        adopt_sections(node)  # a TunableNode has done so itself
+    except ParameterError as error:
+        refuse(name, error)
+        return None
+    return node
+
+
+def _initialized(name: str) -> bool:
+    """Initialize ROS from the command line; return False after `refuse`."""
+    try:
+        # no handlers of rclpy: the context must still send the node's last messages
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy's own classes for a bad parameter file or argument
+        refuse(name, error)
+        return False
+    return True
+
+
 def _failure_of(nodes: Sequence[UamNode]) -> str:
     return next((text for node in nodes if (text := getattr(node, "failure", ""))), "")
 
 
 def refuse(name: str, error: Exception) -> int:
-    """Print in one line why the node does not start; return its exit status, 2."""
+    """Print in one line why the node does not start; return its exit status, REFUSED."""
     text = re.sub(r", at \S+:\d+", "", str(error))  # rcl appends positions in its own sources
     print(f"{name}: {' '.join(text.split())}", file=sys.stderr, flush=True)
-    return 2
+    return REFUSED

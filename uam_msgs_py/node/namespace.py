@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +77,7 @@ def adopt_sections(node: Node) -> None:
         return
     from rclpy.parameter import Parameter
 
-    found = _in_files(node.get_name(), f"/{node.get_name()}")
+    found = _in_files(f"/{node.get_name()}")
     overrides = node._parameter_overrides
     for name, value in found.items():
         if name not in overrides:
@@ -83,22 +85,54 @@ def adopt_sections(node: Node) -> None:
 
 
 def neighbour_section(node: Node, name: str) -> dict[str, Any]:
-    """Return what the parameter files of `node` say for node `name` of the same vehicle.
+    """Return what the command line of `node` says for node `name` of the same vehicle.
 
     ROS gives a node only its own section. Raises ParameterError.
     """
-    bare = _in_files(name, f"/{name}")
-    return bare | _in_files(expanded(node.get_namespace(), name))
+    found = shared_section() | _in_files(f"/{name}")
+    if node.get_namespace() == "/":  # ROS applies `-p node:x:=1` only there
+        return found | _on_command_line(name)
+    return found | _in_files(expanded(node.get_namespace(), name))
 
 
-def _in_files(*names: str) -> dict[str, Any]:
-    """Return the parameters of the sections `names` in the files of the command line."""
+def shared_section() -> dict[str, Any]:
+    """Return what the parameter files say for every node, in `/**`. Raises ParameterError."""
+    return _in_files("/**")
+
+
+def _in_files(section: str) -> dict[str, Any]:
+    """Return the parameters of a section, by its absolute name, in the files of the command line.
+
+    `/uav1/mission:` may also be `uav1: mission:`.
+    """
     found: dict[str, Any] = {}
-    for flag, value in zip(sys.argv, sys.argv[1:], strict=False):
-        if flag == "--params-file":
-            document = yaml_file.read(Path(value), ParameterError)
-            for name in names:
-                body = document.get(name) if isinstance(document, dict) else None
-                if isinstance(body, dict):
-                    found |= body.get("ros__parameters") or {}
+    for file in _arguments("--params-file"):
+        for name, body in _sections(yaml_file.read(Path(file), ParameterError)):
+            if name == section:
+                found |= body
     return found
+
+
+def _sections(document: Any, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the absolute name and the parameters of each section."""
+    if isinstance(document, dict):
+        for key, body in document.items():
+            if key == "ros__parameters":
+                yield path, body or {}
+            else:
+                yield from _sections(body, f"{path}/{str(key).strip('/')}")
+
+
+def _on_command_line(node: str) -> dict[str, Any]:
+    """Return the parameters given as `-p node:name:=value`."""
+    given = (text.partition(":=") for text in _arguments("-p", "--param"))
+    return {
+        name.removeprefix(f"{node}:"): yaml_file.parsed(value)
+        for name, _, value in given
+        if name.startswith(f"{node}:")
+    }
+
+
+def _arguments(*flags: str) -> list[str]:
+    """Return what follows the flags in the command line."""
+    return [value for flag, value in pairwise(sys.argv) if flag in flags]

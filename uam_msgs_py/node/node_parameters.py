@@ -25,6 +25,7 @@ from uam_control.settings.parameter_set import (
     Switch,
     Text,
 )
+from uam_msgs_py.node.namespace import shared_section
 
 S = TypeVar("S", bound=ParameterSet)
 
@@ -161,11 +162,13 @@ def complete(kind: type[ParameterSet], given: dict[str, Any]) -> bool:
 def refuse_unknown(node: Node, shown: str = "") -> None:
     """Raise ParameterError for a name in the parameter file that the node has not declared.
 
-    shown: name of the node in the text, where the process has several.
+    A name in the section `/**` may be that of another node. shown: name of the node in the text,
+    where the process has several.
     """
     prefix = f"{shown}: " if shown else ""
     own = ("use_sim_time", "qos_overrides.", "start_type_description_service")
+    shared = shared_section()
     for name in node._parameter_overrides:
-        if not node.has_parameter(name) and not name.startswith(own):
+        if not (node.has_parameter(name) or name.startswith(own) or name in shared):
             known = sorted(name for name in node._parameters if not name.startswith(own))
             raise ParameterError(f"{prefix}{name}: unknown; allowed: {', '.join(known)}")

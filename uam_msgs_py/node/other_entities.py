@@ -15,9 +15,9 @@ from collections.abc import Sequence
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.service import Service
 from rclpy.timer import Timer
 
+from uam_msgs_py.node.answering import answered
 from uam_msgs_py.node.arrivals import Arrivals
 from uam_msgs_py.node.waiting import WaitSet
 
@@ -85,7 +85,7 @@ class OtherEntities:
     def _answer_one(self) -> bool:
         """Answer the first service request that waits; return whether there was one."""
         for service in self._requests.waiting():
-            if _answered(service):
+            if answered(service):
                 self._requests.more(service)
                 return True
         return False
@@ -127,13 +127,3 @@ class OtherEntities:
     def shutdown(self) -> None:
         """Shut down the inner executor."""
         self._executor.shutdown()
-
-
-def _answered(service: Service) -> bool:
-    """Take one request and send the response; return whether there was one."""
-    request, header = service.handle.service_take_request(service.srv_type.Request)
-    if header is None:
-        return False
-    response = service.callback(request, service.srv_type.Response())
-    service.send_response(response, header)
-    return True

@@ -5,12 +5,15 @@ publish. Where that is the first that sends, it stays once the node works with i
 somebody starts must not replace the sensors of a vehicle in the air.
 
 Another one takes over when the rightful one has left the graph, or when it has the same node name
-and the rightful one is silent: a node that was started again after a crash.
+and the rightful one's process is silent: a node that was started again after a crash. A killed
+process stays in the graph for many seconds. Silence is that on all guarded topics: some are sent
+on change only, and a second node of one name must not take these over in flight.
 """
 
 from __future__ import annotations
 
 import time
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -25,7 +28,28 @@ from uam_msgs_py.node.taking import Taker
 LOOK_PERIOD = 0.02  # [s] wall time between two looks at the graph
 NAME_WAIT = 0.1  # [s] for the node name of a new publisher, which may arrive after its messages
 SILENT = 250_000_000  # [ns] wall time after which a publisher of the same name takes over
+RARE_SILENT = 5_000_000_000  # [ns] likewise from a process of which only rare messages are read
+MANY, MANY_WITHIN = 50, 2_000_000_000  # messages and [ns]: so often is not rare
+PROCESS = slice(12)  # the bytes of a gid that are those of the DDS participant
 UNKNOWN = "unknown node"
+
+
+class Life:
+    """When the newest messages of a process arrived, over all guards of this process."""
+
+    def __init__(self) -> None:
+        self._times: deque[int] = deque(maxlen=MANY)
+        self.heard = self._times.append  # heard(time [ns]): of the arrival of a message
+
+    def silent(self, now: int) -> bool:
+        """Return whether the process has been silent for too long at `now` [ns]."""
+        times = self._times
+        newest = max(times)  # topics are read one after the other
+        often = len(times) == MANY and newest - min(times) < MANY_WITHIN
+        return now - newest > (SILENT if often else RARE_SILENT)
+
+
+_lives: defaultdict[bytes, Life] = defaultdict(Life)  # by PROCESS
 
 
 class SolePublisher:
@@ -39,7 +63,7 @@ class SolePublisher:
         self._expected = rightful
         self.taker = Taker(subscription)
         self._gid = b""  # of the rightful publisher
-        self._last = 0  # [ns] wall time of its last message
+        self._life = Life()  # of its process
         self._looked = 0.0  # time.monotonic() of the last look at the graph
         self._foreign: dict[bytes, str] = {}  # gid → node name
         self._counts: dict[bytes, int] = {}  # gid → refused messages
@@ -50,7 +74,7 @@ class SolePublisher:
         taker = self.taker
         while (data := taker.take()) is not None:
             if taker.gid == self._gid or self._takes_over():
-                self._last = taker.info.received_timestamp
+                self._life.heard(taker.info.received_timestamp)
                 return data
         return None
 
@@ -93,6 +117,7 @@ class SolePublisher:
             names = self._named_publishers(gid)
             if self._may(gid, names):
                 self._gid, self.rightful = gid, names.get(gid, UNKNOWN)
+                self._life = _lives[gid[PROCESS]]
                 self._counts.pop(gid, None)
                 return True
             if gid in names:
@@ -104,7 +129,7 @@ class SolePublisher:
         name, expected = names.get(gid, UNKNOWN), self._expected
         if self._gid in names:  # the rightful one is there
             if name == self.rightful:
-                return self.taker.info.received_timestamp - self._last > SILENT
+                return self._life.silent(self.taker.info.received_timestamp)
             return name == expected.name and not self._works()
         return name == expected.name or not (expected.only or expected.name in names.values())
 

@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.node.namespace import adopt_sections
+from uam_msgs_py.node.node_parameters import NodeParameters
 
 SERVICE = "parameter service"
 CHECK = "check_parameters"
@@ -64,10 +65,12 @@ class TunableNode(Node):
                 return _refusal(f"{name}: unknown")
             if self.describe_parameter(name).read_only:
                 return _refusal(f"{name}: read-only, fixed once the node runs")
-        for check in list(self._on_set_parameters_callbacks):
-            result = check(changes)
-            if not result.successful:
-                return result
+        for check in self._on_set_parameters_callbacks:
+            # others act at once: that of rclpy begins simulated time
+            if isinstance(getattr(check, "__self__", None), NodeParameters):
+                result = check(changes)
+                if not result.successful:
+                    return result
         return SetParametersResult(successful=True)
 
     def publish_change(self, change: ParameterChange) -> None:

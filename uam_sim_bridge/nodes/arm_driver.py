@@ -137,7 +137,8 @@ class ArmDriverNode(UamNode):
         self.driver.command_position(read_joint_command(data, self._names))
 
     def _on_reference(self, data: bytes) -> None:
-        self._velocity = read_reference(data)[1].values[CHI_DOT, ALPHA:].copy()
+        reference = read_reference(data, len(self._names))[1]
+        self._velocity = reference.values[CHI_DOT, ALPHA:].copy()
 
     def _on_reboot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._bus.problem:

@@ -18,9 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import CHI
@@ -32,7 +30,8 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 from uam_msgs_py.node import polling
-from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.answering import ServingExecutor
+from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
@@ -113,7 +112,7 @@ class Rehearsal:
         self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
         self._checklist = polling.listen(node, topics.CHECKLIST)
         self._confirm = node.create_client(Trigger, "checklist/confirm")
-        self._executor = SingleThreadedExecutor()
+        self._executor = ServingExecutor()
         self._executor.add_node(node)
         self.clock = PacedClock(self.lab.plant.period)
         self._mission = MissionStatus()
@@ -237,8 +236,9 @@ def main() -> int:
     """
     stop = StopSignal()
     sys.setswitchinterval(SWITCH)
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    node = TunableNode(NAME)
+    node = begin(NAME, TunableNode)
+    if node is None:
+        return REFUSED
     rehearsal = None
     try:
         vehicle, parameters = laboratory_options.declare(node)

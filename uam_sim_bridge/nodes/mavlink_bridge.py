@@ -173,7 +173,7 @@ class MavlinkBridgeNode(UamNode):
         self.listen(topic, handle)
 
     def _read_state(self, data: bytes) -> tuple[int, np.ndarray]:
-        stamp, state = read_state(data)
+        stamp, state = read_state(data, len(self._vehicle.joints))
         self.stage.note_state(stamp, state)
         return stamp, state
 

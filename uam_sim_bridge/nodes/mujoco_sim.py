@@ -25,14 +25,12 @@ from __future__ import annotations
 import gc
 import json
 import math
-import sys
 import time
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import POSITION
@@ -42,7 +40,7 @@ from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
 from uam_msgs_py.node import polling, wiring
-from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
@@ -460,8 +458,9 @@ def main() -> int:
     """
     stop = StopSignal()
     # The context must outlive the signal, as there are statistics to write and links to close.
-    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    node = TunableNode(NAME)
+    node = begin(NAME, TunableNode)
+    if node is None:
+        return REFUSED
     simulator = None
     try:
         options = declare(node)

@@ -48,5 +48,5 @@ def read_outcome(
         if settings.dry_run and ended and not full:
             outcome.abort_reason = f"dry run, {ended}: nothing was armed"
         else:
-            outcome.failure = ended or "the mission did not end"
+            outcome.failure = ended or "the log has no end of the mission"
     return outcome

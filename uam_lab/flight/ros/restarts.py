@@ -11,7 +11,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import WARN, diagnostic
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import listen, messages
+from uam_msgs_py.node.polling import decoded, listen
 
 
 class ChangedParameters:
@@ -23,8 +23,8 @@ class ChangedParameters:
 
     def poll(self) -> None:
         """Store the received changes."""
-        for message in messages(self._subscription):
-            self.note(ParameterChange.from_message(message)[1])
+        for _, change in decoded(self._subscription, ParameterChange.from_message):
+            self.note(change)
 
     def note(self, change: ParameterChange) -> None:
         """Store a change if it was accepted."""

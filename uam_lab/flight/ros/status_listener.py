@@ -13,7 +13,7 @@ from uam_lab.flight.observer import FlightStatus
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
-from uam_msgs_py.node.polling import listen, messages
+from uam_msgs_py.node.polling import decoded, listen
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.sole_publisher import SolePublisher
 
@@ -57,10 +57,10 @@ class StatusListener(Guest):
 
     def poll(self) -> list[FlightStatus]:
         """Return the status messages received since the last call."""
-        for message in messages(self._autopilot, self._guards[self._autopilot]):
-            self._state, self._heard = AutopilotState.from_message(message)[1], True
-        guard = self._guards[self._mission]
-        found = [self._status(message) for message in messages(self._mission, guard)]
+        guard = self._guards[self._autopilot]
+        for _, state in decoded(self._autopilot, AutopilotState.from_message, guard):
+            self._state, self._heard = state, True
+        found = list(decoded(self._mission, self._status, self._guards[self._mission]))
         self.newest = found[-1:] or self.newest
         return found
 

@@ -1,0 +1,40 @@
+"""Answers service requests; an exception of a callback never ends the node.
+
+rclpy's own callbacks raise too: ValueError for a parameter of an unknown type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.service import Service
+
+
+def answered(service: Service) -> bool:
+    """Take one request and send the response; return whether there was one.
+
+    If the callback raises, the response has what it filled in so far: without anything, that of
+    our services and of set_parameters_atomically is a refusal.
+    """
+    request, header = service.handle.service_take_request(service.srv_type.Request)
+    if header is None:
+        return False
+    response = service.srv_type.Response()
+    try:
+        response = service.callback(request, response)
+    except Exception as error:
+        text = f"{service.service_name}: request refused: {type(error).__name__}: {error}"
+        get_logger(service.logger_name).error(text)
+    service.send_response(response, header)
+    return True
+
+
+class ServingExecutor(SingleThreadedExecutor):
+    """rclpy's, with services as in `answered`; their callbacks are no coroutines."""
+
+    def _take_service(self, srv: Service) -> Callable[[], Coroutine[None, None, None]] | None:
+        """Answer now: rclpy calls this when it executes the service."""
+        answered(srv)
+        return None
