@@ -8,7 +8,9 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import MissionParameters, load_scenario
-from uam_control.mission.guidance import Guidance, PathClock, Segment
+from uam_control.mission.guidance import Guidance
+from uam_control.mission.motion.path_clock import PathClock
+from uam_control.mission.motion.segments import Segment
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.shift import Shift
 

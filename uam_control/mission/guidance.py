@@ -30,130 +30,14 @@ from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.flatness import write_reference
-from uam_control.mission.motion.polynomials import hermite
-from uam_control.mission.motion.quintics import quintic, quintic_at
+from uam_control.mission.motion.path_clock import PathClock
+from uam_control.mission.motion.segments import Segment, WayBack
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion
 from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan, still
 from uam_control.mission.scenarios.route import SINK
 
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
 STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a scenario time that passes as the stamps do
-
-
-class PathClock:
-    """Scenario time as a function of the stamp: it advances, slows down to a stop, or restarts.
-
-    During a change its rate is a cubic polynomial of the stamp; rate and slope are continuous.
-    """
-
-    def __init__(self, stamp: float) -> None:
-        """stamp [s] at which the scenario begins."""
-        self._begin = stamp
-        self._ramp: tuple[float, float, float, float, float, float] | None = None
-        self._end: tuple[float, ...] = ()  # see `_on_ramp`, at the end of the ramp
-
-    def at(self, stamp: float) -> tuple[float, float, float, float, float]:
-        """Return scenario time [s] and its first to fourth derivative [1, 1/s, 1/s^2, 1/s^3]."""
-        if self._ramp is None:
-            return stamp - self._begin, 1.0, 0.0, 0.0, 0.0
-        begin, length, time, _, _, goal = self._ramp
-        elapsed = stamp - begin
-        if elapsed >= length:  # for most of a flight: only the time changes
-            gained, one, two, three, four = self._end
-            return time + (goal * (elapsed - length) + gained), one, two, three, four
-        gained, one, two, three, four = self._on_ramp(max(elapsed / length, 0.0))
-        return time + gained, one, two, three, four
-
-    def _on_ramp(self, u: float) -> tuple[float, float, float, float, float]:
-        """Return the scenario time [s] since the begin of the ramp, and its derivatives.
-
-        u = 0..1: part of the ramp's length that has passed.
-        """
-        _, length, _, rate, slope, goal = self._ramp
-        gained = length * (
-            rate * (u - u**3 + u**4 / 2)
-            + length * slope * (u**2 / 2 - 2 * u**3 / 3 + u**4 / 4)
-            + goal * (u**3 - u**4 / 2)
-        )
-        now = rate * (1 - 3 * u**2 + 2 * u**3) + goal * (3 * u**2 - 2 * u**3)
-        now += length * slope * (u - 2 * u**2 + u**3)
-        change = (goal - rate) * 6 * (u - u**2) / length + slope * (1 - 4 * u + 3 * u**2)
-        if not 0.0 < u < 1.0:
-            return gained, now, change, 0.0, 0.0
-        third = (goal - rate) * 6 * (1 - 2 * u) / length**2 + slope * (6 * u - 4) / length
-        fourth = (rate - goal) * 12 / length**3 + slope * 6 / length**2
-        return gained, now, change, third, fourth
-
-    @property
-    def goal(self) -> float:
-        """Return the rate [1] to which the clock changes, or has changed."""
-        return 1.0 if self._ramp is None else self._ramp[-1]
-
-    @property
-    def settled(self) -> float:
-        """Return the stamp [s] from which on the rate is constant."""
-        return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
-
-    def change(self, stamp: float, goal: float, length: float) -> None:
-        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s] on.
-
-        No effect if it changes to `goal` already.
-        """
-        if self._ramp is not None and goal == self.goal:
-            return
-        self._ramp = (stamp, length, *self.at(stamp)[:3], goal)
-        self._end = self._on_ramp(1.0)
-
-
-class Segment:
-    """Quintic polynomials from a motion to rest at a goal, one duration per coordinate."""
-
-    def __init__(
-        self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
-    ) -> None:
-        """Begin at `stamp` [s] at start (3, 6 + n) or (5, 6 + n); end at goal (6 + n,), after
-        lengths (6 + n,) [s].
-        """
-        self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
-        rest = np.zeros_like(start)
-        rest[CHI] = goal
-        self._powers = quintic(start, rest, lengths)
-
-    @property
-    def end(self) -> float:
-        """Return the stamp [s] at which all coordinates are at rest."""
-        return self._stamp + float(np.max(self._lengths))
-
-    def write(self, stamp: float, motion: np.ndarray) -> None:
-        """Write the motion (5, 6 + n) at `stamp` [s]."""
-        u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
-        motion[:] = quintic_at(self._powers, u, self._lengths)
-        arrived = u >= 1.0  # without rounding errors
-        motion[CHI, arrived] = self._goal[arrived]
-        motion[CHI_DOT:, arrived] = 0.0
-
-
-class WayBack:
-    """Offset from the path that decays to zero, with no step in value, rate or acceleration.
-
-    From rest the jerk has no step either.
-
-    `end` [s]: stamp at which it is zero. PEAK, HARDEST: from rest, largest rate and acceleration,
-    times length / way and length^2 / way.
-    """
-
-    PEAK, HARDEST = 35.0 / 16.0, 7.5132
-
-    def __init__(self, stamp: float, offset: np.ndarray, length: float) -> None:
-        """Begin at `stamp` [s] with offset (5, 6 + n); end at rest after `length` [s]."""
-        rows = np.zeros((SNAP, 2, offset.shape[1]))
-        rows[:JERK, 0] = offset[:JERK]  # a jerk at the start would grow with the cube of the length
-        self._stamp, self.end = stamp, stamp + length
-        self._curve = hermite(np.array([0.0, length]), rows)
-
-    def write(self, stamp: float, motion: np.ndarray) -> None:
-        """Write the offset (5, 6 + n) at `stamp` [s]."""
-        self._curve.write(stamp - self._stamp, motion)
 
 
 def _unshifted(motion: np.ndarray) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.coordinates import CHI, MOTION_ROWS, POSITION
-from uam_control.mission.guidance import Segment
+from uam_control.mission.motion.segments import Segment
 from uam_control.mission.plans import PEAK
 
 SPEED = 0.05  # [m/s] peak speed of a change

@@ -167,8 +167,9 @@ def refuse_unknown(node: Node, shown: str = "") -> None:
     """
     prefix = f"{shown}: " if shown else ""
     own = ("use_sim_time", "qos_overrides.", "start_type_description_service")
-    shared = shared_section()
     for name in node._parameter_overrides:
-        if not (node.has_parameter(name) or name.startswith(own) or name in shared):
+        if node.has_parameter(name) or name.startswith(own):
+            continue
+        if name not in shared_section():  # it reads the files: only for a name in question
             known = sorted(name for name in node._parameters if not name.startswith(own))
             raise ParameterError(f"{prefix}{name}: unknown; allowed: {', '.join(known)}")

@@ -5,7 +5,7 @@
 | valid | the setpoint type's part of body rates, attitude and thrust |
 | idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays landed |
 | valid or idle, while somebody else has control | the vehicle's rates, attitude and thrust; \
-without commands none |
+without commands, or in the air before the first flight, none |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
