@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from functools import partial
 
 import numpy as np
@@ -186,6 +187,11 @@ class Hands:
         self.go(0.6, **begin)
         self.until(lambda: self.state.step != name or self.state.failed, f"{name} to end")
 
+    def killed_long_enough(self):
+        """Return whether the kill switch has been seen engaged for a second and more."""
+        found = re.match(r"engaged for ([0-9.]+) s$", self.state.seen)
+        return found is not None and float(found[1]) >= 1.0
+
     def until_asked(self, condition):
         """Publish until `condition(instruction)`, or the step has failed."""
         self.until(
@@ -220,7 +226,7 @@ def test_all_steps_pass_and_are_recorded(probe, start, tmp_path):
         assert hands.call("confirm")[0]
     hands.until_step("kill_switch")
     hands.killed = True
-    hands.until(lambda: "engaged for 1." in hands.state.seen, "the kill switch")
+    hands.until(hands.killed_long_enough, "the kill switch")
     hands.killed = False
     hands.until_step("clear")
     assert not hands.state.passed
@@ -243,10 +249,12 @@ def test_all_steps_pass_and_are_recorded(probe, start, tmp_path):
     assert "gyro against mocap" in items["tilt_roll"]["value"]
     assert items["tilt_roll"]["time"] and items["tilt_roll"]["tries"] == 1
 
-    hands.left = "recorder"  # an automatic item that fails takes the permission back
-    hands.until(lambda: not hands.state.passed, "the permission to be taken back")
-    assert hands.state.failing == "nodes"
-    assert hands.items["nodes"].value.startswith("recorder: silent for ")
+    # An automatic item that fails takes the permission back. Others may fail for a moment: a test
+    # that had no processor for a second has sent no sensors.
+    hands.left = "recorder"
+    hands.until(lambda: hands.state.failing == "nodes", "the permission to be taken back")
+    assert not hands.state.passed
+    assert "recorder: silent for " in hands.items["nodes"].value
     hands.left = ""
     hands.until(lambda: hands.state.passed, "the permission to come back")
     assert hands.node.interrupt() == 0
