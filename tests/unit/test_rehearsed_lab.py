@@ -200,6 +200,15 @@ def test_latencies_and_missed_ticks():
     assert latencies(FakeLog(states, [], []), 0.004)[1] == 5
 
 
+def test_latencies_of_given_ticks():
+    ms = 1_000_000
+    states = [4 * ms * k for k in range(1, 6)]
+    # the first tick's setpoint late and once more in time, the last one not of a tick
+    log = FakeLog(states, [states[0], states[0], 1], [states[0] + 13 * ms, states[0] + ms, 2])
+    found, missed = latencies(log, 0.004, np.array(states[:2]))
+    assert found == pytest.approx([0.013, 0.001]) and missed == 1
+
+
 def checklist(passed, failing, *items):
     head = report("checklist", passed=passed, failing=failing, step="lift").status[0]
     head.message = "open: lift"

@@ -27,6 +27,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.logged_topics import ADAPTATION, Log, StampedRows
 from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.recording.setpoint_latencies import latencies
 from uam_lab.results import timeseries
 from uam_lab.results.outcome import Outcome, grasp_decision, transition
 from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
@@ -34,7 +35,6 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.fault_events import FaultEvent
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
-from uam_sim_bridge.nodes.latencies import DEADLINE_TICKS
 
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
 ESTIMATE = "estimate"
@@ -182,8 +182,8 @@ def read_flight(
     found = LoggedFlight(series, ended, abort_reason, *events, wall, [*log.notes, *notes])
     if simulated:
         return found
-    period = vehicle.control_period
-    return replace(found, errors_of=ESTIMATE, **latencies(log, ticks, period))
+    latency, missed = latencies(log, vehicle.control_period, ticks)
+    return replace(found, errors_of=ESTIMATE, latency_s=latency.tolist(), missed=missed)
 
 
 def withheld(log: Log, ticks: np.ndarray, states: np.ndarray, references: np.ndarray) -> np.ndarray:
@@ -285,20 +285,6 @@ def _measured(
     stamps = np.array([stamp for stamp, _ in statuses], dtype=np.int64)
     on = np.array([[float(status.magnet)] for _, status in statuses]).reshape(-1, 1)
     values[:, columns["magnet.on"]] = StampedRows(stamps, on).at(ticks)[:, 0]
-
-
-def latencies(log: Log, ticks: np.ndarray, period: float) -> dict[str, Any]:
-    """Return `latency_s` (m,): stamp of a tick → its setpoint was published, on the wall clock [s],
-    and `missed`: the ticks without a setpoint within DEADLINE_TICKS.
-
-    ticks (k,) [ns], of the wall clock; period: of the control ticks [s].
-    """
-    stamps, published = log.published(topics.SETPOINT)
-    found = (published - stamps)[np.isin(stamps, ticks)] / SECOND
-    return {
-        "latency_s": found.tolist(),
-        "missed": len(ticks) - int(np.count_nonzero(found <= DEADLINE_TICKS * period)),
-    }
 
 
 def transitions(
