@@ -262,7 +262,7 @@ def test_all_steps_pass_and_are_recorded(probe, start, tmp_path):
 
 
 def test_a_reversed_gyro_is_not_passed(probe, start):
-    hands = Hands(probe, start, Wiring(gyro=-1.0))
+    hands = Hands(probe, start, Wiring(gyro=-1.0), rest_time=1.5)  # longer than by default
     hands.until_step("hands_on")
     hands.call("confirm")
     hands.swing("tilt_roll", turn=[axis_vector(0, 0.3), axis_vector(0, -0.3)])

@@ -14,6 +14,7 @@ from uam_lab.checklist.finding import Finding
 from uam_lab.checklist.guided import guided
 from uam_lab.checklist.limits import ChecklistParameters
 from uam_lab.checklist.motion_step import MotionStep
+from uam_lab.checklist.samples import Window
 from uam_lab.checklist.step import Situation, StepState
 
 LIMITS = ChecklistParameters()
@@ -181,6 +182,22 @@ def test_a_tilted_vehicle_does_not_begin():
     vehicle.go(step, 2.0)
     assert step.instruction == "Hold the vehicle level and at rest."
     assert step.seen == "tilted by 0.20 rad, at most 0.12"
+
+
+def test_samples_on_both_sides_of_a_gap_are_no_still_pose():
+    vehicle, window = HeldVehicle(), Window(1.0)
+    for _ in range(20):
+        window.add(vehicle.sample())
+    assert len(window.last(0.5)) == 13
+    vehicle.time += 0.3
+    window.add(vehicle.sample())
+    assert window.last(0.5) == []
+    vehicle.time += 0.6
+    window.add(vehicle.sample())
+    assert window.last(0.5) == []  # a single one is left
+    for _ in range(12):
+        window.add(vehicle.sample())
+    assert len(window.last(0.5)) == 13
 
 
 def test_without_samples_nothing_happens():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -53,10 +54,12 @@ class GyroIntegral:
 
 
 class Window:
-    """Samples of the last `span` [s]."""
+    """Samples of the last `span` [s], which may be changed."""
+
+    LONGEST_GAP = 0.2  # [s] over a longer one nothing is known of the motion
 
     def __init__(self, span: float) -> None:
-        self._span = span
+        self.span = span
         self._samples: deque[Sample] = deque()
 
     def add(self, sample: Sample) -> None:
@@ -65,7 +68,7 @@ class Window:
         if samples and sample.time < samples[-1].time:
             samples.clear()
         samples.append(sample)
-        while samples[-1].time - samples[0].time > self._span + 1e-9:
+        while samples[-1].time - samples[0].time > self.span + 1e-9:
             samples.popleft()
 
     def clear(self) -> None:
@@ -75,13 +78,18 @@ class Window:
     def last(self, span: float) -> list[Sample]:
         """Return the samples of the last `span` [s]; [] if the window does not reach back so far.
 
-        A tenth of the span may lack at its beginning.
+        A tenth of the span may lack at its beginning. [] also after a gap: the few samples that are
+        left would look still, and their means would be of a motion.
         """
         samples = self._samples
         if not samples or samples[-1].time - samples[0].time < 0.9 * span:
             return []
         begin = samples[-1].time - span - 1e-9
-        return [one for one in samples if one.time >= begin]
+        found = [one for one in samples if one.time >= begin]
+        times = [begin, *(one.time for one in found)]
+        if any(after - before > self.LONGEST_GAP for before, after in pairwise(times)):
+            return []
+        return found
 
 
 def rotation_vector(begin: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -74,7 +74,7 @@ class Feed:
         self.observation, self._host = observation, host
         self._streams = {topic: Stream() for topic in (topics.IMU, topics.JOINTS, topics.MOCAP)}
         self._gyro = GyroIntegral()
-        self._window = Window(span=1.0)
+        self._window = Window(limits().rest_time)
         self._stamp, self._arrival = 0.0, time.monotonic()  # newest IMU stamp [s]
         self._pose: tuple[np.ndarray, np.ndarray] | None = None
         self._joints: np.ndarray | None = None
@@ -124,14 +124,15 @@ class Feed:
                     self._readers[topic](message)
                 except BadMessage as error:
                     self.bad = f"{topic.name}: {error}"
-        sample = self._sample()
+        sample, rest_time = self._sample(), self._limits().rest_time
+        self._window.span = rest_time
         if sample is not None:
             self._window.add(sample)
         now = self.now
         seen.imu, seen.joint_states, seen.mocap = (
             self._streams[topic].report(now) for topic in (topics.IMU, topics.JOINTS, topics.MOCAP)
         )
-        rest = self._window.last(self._limits().rest_time)
+        rest = self._window.last(rest_time)
         still_there = time.monotonic() - self._arrival < SILENCE
         seen.resting = Resting.of(rest) if rest and still_there else None
         self._age_nodes()
