@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from uam_control.coordinates import ARM, CHI, YAW
 from uam_control.mission import Mission, MissionParameters, load_scenario
-from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check, still
+from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check
 from uam_control.supervision import OperatorCommand, Readings, State
 from uam_control.vehicle import derived_parameters, load_description
 
@@ -154,11 +154,27 @@ def test_outside_the_fence_a_goal_inside_is_accepted_and_one_further_out_refused
             check(GoalPose(np.array([x, 0.0, 1.0])).plan(10.0, outside, P), P, ground=0.28)
 
 
-def test_still_stops_the_arm_and_the_base():
-    begin = reference(speed=(0.4, 0.0, 0.0))
-    begin[1, ARM] = 0.3, -0.3
-    for columns in (BASE, ARM):
-        assert_continuous(still(10.0, begin, columns, P), begin[:, columns])
+@pytest.mark.parametrize("at", [1.0, 2.5, 5.9])
+def test_a_plan_stops_on_its_curve(at):
+    rows = [(0.0, 0.0, 1.0), (1.0, 0.2, 1.0), (1.0, 1.0, 1.3), (0.0, 1.0, 1.0)]
+    plan = base([0.0, 2.0, 4.0, 6.0], rows).plan(10.0, reference(), P)
+    curve = plan.at(np.linspace(0.0, 6.0, 3001))[CHI]
+    plan.stop(10.0 + at, 1.5)
+    assert plan.end == 11.5 + at
+    plan.stop(10.5 + at, 0.1)  # it stops already
+    stamps, motion = np.linspace(10.0 + at, 11.5 + at, 301), np.zeros((5, 8))
+    found = []
+    for stamp in stamps:
+        plan.write(stamp, motion)
+        found.append(motion[:, :6].copy())
+    found, dt = np.array(found), stamps[1] - stamps[0]
+    for values, rates in ((0, 1), (1, 2)):
+        slopes = (found[2:, values] - found[:-2, values]) / (2 * dt)
+        np.testing.assert_allclose(slopes, found[1:-1, rates], atol=0.02)
+    away = np.linalg.norm(found[:, None, CHI, :3] - curve[None, :, :3], axis=2).min(axis=1)
+    assert away.max() < 2e-3
+    assert not found[-1, 1:].any()
+    np.testing.assert_allclose(found[-1, CHI], plan.at(np.array([at + 0.75]))[CHI, 0], atol=1e-9)
 
 
 FRESH = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
@@ -197,6 +213,35 @@ class Flight:
         np.testing.assert_allclose(rates, values[1:-1, 1], atol=4e-3)
         slopes = (values[2:, 1] - values[:-2, 1]) / (2 * dt)
         np.testing.assert_allclose(slopes, values[1:-1, 2], atol=0.12)
+
+
+@pytest.mark.parametrize("at", [9.0, 12.3, 15.0, 18.2])
+def test_a_landing_from_a_fast_path_stops_on_the_path_first(at):
+    """The straight way to rest at stop_acceleration would be 12 m long."""
+    flight = Flight("circle_fast")
+    flight.until(lambda output: output.time >= at)
+    flight.references.clear()
+    assert flight.mission.request(OperatorCommand.LAND)[0]
+    flight.until(lambda output: output.state is State.DISARMED)
+    places = np.array(flight.references)[:, CHI, :3]
+    assert np.abs(places[:, :2]).max() < 1.1  # the circle has a radius of 1 m
+    assert places[-1, 2] < 0.3
+    flight.assert_smooth()
+
+
+def test_a_landing_from_a_fast_plan_stops_on_the_plan_first():
+    flight = Flight("hover")
+    flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)
+    now = flight.state[CHI, :3]
+    rows = [now + np.array(offset) for offset in ((0, 0, 0), (0.9, 0, 0), (0.9, 0.9, 0))]
+    assert flight.mission.plan(base([0.0, 2.0, 4.0], rows))[0]
+    flight.step(180)  # almost at the corner
+    flight.references.clear()
+    assert flight.state[1, 0] > P.travel_speed
+    assert flight.mission.request(OperatorCommand.LAND)[0]
+    flight.until(lambda output: output.state is State.DISARMED)
+    assert np.array(flight.references)[:, CHI, 0].max() < now[0] + 1.15
+    flight.assert_smooth()
 
 
 @pytest.mark.parametrize("during", [0.0, 13.0])

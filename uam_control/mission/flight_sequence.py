@@ -95,6 +95,7 @@ class Mission:
         self._failsafe_since = math.inf
         self._end: float | None = None
         self._override = MagnetOverride()
+        self._descent: Decision | None = None  # to land, while the reference slows down for it
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
         self._ground_pose = GroundPose()
         self._followed: Decision | None = None  # the newest decision whose values are in the output
@@ -388,6 +389,8 @@ class Mission:
             self._enter(stamp, before, decision)
         if decision.state is State.RELEASED or self._standing is not None:
             self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
+        if self._descent is not None and not self._guidance.fast:
+            self._descend(stamp)
         if decision is not self._followed:
             self._followed = decision
             output.cause, output.arm = decision.cause, decision.arm
@@ -395,6 +398,12 @@ class Mission:
         output.flying = decision.guide is not Guide.NOTHING  # `GroundPose` writes it, too
         output.phase = self._phase(decision)
         output.magnet = self._magnet_on(decision)
+
+    def _descend(self, stamp: float) -> None:
+        """Begin the descent of an unplanned landing, vertically from the vehicle's position."""
+        stow, self._descent = self._descent.stow, None
+        self._guidance.descend(stamp, self._seen.state, self._ground, stow)
+        self._touchdown.descend(stamp, self._guidance.end)
 
     def _stow_released(self, stamp: float, stow: bool) -> None:
         """Stow the arm of a released vehicle; a vehicle that stands is not levered up with it."""
@@ -408,7 +417,7 @@ class Mission:
             self._guidance.move_arm(stamp, state[CHI, ARM] if standing.value else None)
 
     def _enter(self, stamp: float, before: State, decision: Decision) -> None:
-        state, guidance = decision.state, self._guidance
+        state, guidance, self._descent = decision.state, self._guidance, None
         planned = decision.guide is Guide.SCENARIO or self.changes[-1].event is Event.TOUCHDOWN
         if state not in (State.HOLDING, State.RELEASED) and not planned:
             reasons = (self.output.abort_reason, decision.cause)
@@ -424,8 +433,9 @@ class Mission:
         elif self.changes[-1].event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
-            guidance.descend(stamp, self._seen.state, self._ground, decision.stow)
-            self._touchdown.descend(stamp, guidance.end)
+            self._descent = decision
+            if guidance.fast:
+                guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
         elif state is State.FAILSAFE:
             guidance.rest(stamp, decision.stow)
             self._failsafe_since = stamp

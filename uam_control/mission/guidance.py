@@ -15,11 +15,9 @@ from uam_control.coordinates import (
     ALPHA,
     ARM,
     CHI,
-    CHI_DDOT,
     CHI_DOT,
     JERK,
     POSITION,
-    SNAP,
     YAW,
     X,
     Y,
@@ -30,14 +28,13 @@ from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.flatness import write_reference
-from uam_control.mission.motion.path_clock import PathClock
+from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.segments import Segment, WayBack
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion
-from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan, still
+from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan
 from uam_control.mission.scenarios.route import SINK
 
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
-STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a scenario time that passes as the stamps do
 
 
 def _unshifted(motion: np.ndarray) -> None:
@@ -236,15 +233,23 @@ class Guidance:
             self._arm = self._arm_segment(stamp, angles)
         self.write(stamp)
 
-    def stop(self, stamp: float, stow: bool) -> None:
+    @property
+    def fast(self) -> bool:
+        """Return whether the reference moves across faster than a landing may."""
+        across = self.motion[CHI_DOT, X:Z]
+        return math.hypot(across.item(0), across.item(1)) > self.parameters.travel_speed
+
+    def stop(self, stamp: float, stow: bool, acceleration: float | None = None) -> None:
         """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`.
 
-        A descent ends: `stay` then sets the reference. A plan ends in a stop, too.
+        acceleration [m/s^2]: in place of stop_acceleration. A descent ends: `stay` then sets the
+        reference. A plan ends in a stop, too, on its curve.
         """
-        for key, plan in self._plans.items():
-            if stamp < plan.end:
-                self._plans[key] = still(stamp, self.motion, plan.columns, self.parameters)
-        self._stop_clock(stamp)
+        p, speed = self.parameters, float(np.linalg.norm(self.motion[CHI_DOT, POSITION]))
+        length = max(p.stop_time, RAMP * speed / (acceleration or p.stop_acceleration))
+        for plan in self._plans.values():
+            plan.stop(stamp, length)
+        self._stop_clock(stamp, acceleration)
         if self._last is not None:
             self._last = None
             self._plans.clear()
@@ -286,7 +291,10 @@ class Guidance:
             self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
-        """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m]."""
+        """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m].
+
+        A `fast` reference needs a way to its rest, straight on and off the path: `stop` it first.
+        """
         p, now = self.parameters, self.motion
         offset = state[CHI, POSITION] - now[CHI, POSITION]
         if not np.all(np.isfinite(offset)):  # then descend from the reference
@@ -310,9 +318,9 @@ class Guidance:
         """Bring the reference to rest; in failsafe only its arm angles are used."""
         self._last = Segment(stamp, self.motion, *self._at_rest(stow))
 
-    def _stop_clock(self, stamp: float) -> None:
+    def _stop_clock(self, stamp: float, acceleration: float | None = None) -> None:
         """Slow down to a stop on the path."""
-        self._clock.change(stamp, 0.0, self._ramp_length())
+        self._clock.change(stamp, 0.0, self._ramp_length(acceleration=acceleration))
         self._go_on_at = self._return_at = math.inf
 
     def _on_path(self) -> np.ndarray:
@@ -324,21 +332,8 @@ class Guidance:
         """Write the path (5, 6 + n) at the scenario time, by the chain rule for its clock."""
         self._trajectory.write(self.scenario_time, path)
         if self._rates != STEADY:
-            self._scale(path)
+            scale(path, self._rates)
         self.shift(path)
-
-    def _scale(self, path: np.ndarray) -> None:
-        """Apply the derivatives of the scenario's clock to the path (5, 6 + n)."""
-        one, two, three, four = self._rates
-        path[SNAP] = (
-            one**4 * path[SNAP]
-            + 6.0 * one**2 * two * path[JERK]
-            + (4.0 * one * three + 3.0 * two**2) * path[CHI_DDOT]
-            + four * path[CHI_DOT]
-        )
-        path[JERK] = one**3 * path[JERK] + 3.0 * one * two * path[CHI_DDOT] + three * path[CHI_DOT]
-        path[CHI_DDOT] = one**2 * path[CHI_DDOT] + two * path[CHI_DOT]
-        path[CHI_DOT] *= one
 
     def _return(self, stamp: float, offset: np.ndarray) -> None:
         """Let the offset (5, 6 + n) from the path decay to zero."""
@@ -382,12 +377,12 @@ class Guidance:
         peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
         return max(p.stop_time, PEAK * float(np.max(back / peak)))
 
-    def _ramp_length(self, shortest: float = math.inf) -> float:
+    def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:
         """Return the time [s] to stop or to resume within stop_acceleration.
 
-        shortest [s]: in place of a longer stop_time.
+        shortest [s]: in place of a longer stop_time; acceleration [m/s^2]: of stop_acceleration.
         """
         self._trajectory.write(self.scenario_time, self._path)
         speed = float(np.linalg.norm(self._path[CHI_DOT, POSITION]))
         shortest = min(shortest, self.parameters.stop_time)
-        return max(shortest, RAMP * speed / self.parameters.stop_acceleration)
+        return max(shortest, RAMP * speed / (acceleration or self.parameters.stop_acceleration))

@@ -23,6 +23,7 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.quintics import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
@@ -37,7 +38,10 @@ class PlanRefused(ValueError):
 
 
 class Plan:
-    """A curve through points plus a blend that decays to zero; afterwards the last point."""
+    """A curve through points plus a blend that decays to zero; afterwards the last point.
+
+    It may be stopped on its way; then it stays there.
+    """
 
     def __init__(
         self, stamp: float, times: np.ndarray, points: np.ndarray, blend: Blend, columns: slice
@@ -55,11 +59,21 @@ class Plan:
         offset = blend.start - points[:, 0]
         self._offset = quintic(offset, np.zeros_like(offset), blend.length)
         self._length = max(float(times[-1]), blend.length)
+        self._clock = PathClock(stamp)
 
     @property
     def end(self) -> float:
         """The stamp [s] from which on the plan is at rest."""
-        return self._stamp + self._length
+        stopped = self._clock.goal == 0.0
+        return self._clock.settled if stopped else self._stamp + self._length
+
+    def stop(self, stamp: float, length: float) -> None:
+        """Slow down to a stop on the curve within `length` [s] from `stamp` [s] on.
+
+        No effect at the end, or if it stops already.
+        """
+        if stamp < self.end:
+            self._clock.change(stamp, 0.0, length)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return values, rates .. snaps (5, q, k) at times (q,) [s] from the start."""
@@ -78,7 +92,11 @@ class Plan:
 
     def write(self, stamp: float, motion: np.ndarray) -> None:
         """Write the plan's columns of motion (5, 6 + n) at `stamp` [s]."""
-        motion[:, self.columns] = self.at(np.array([stamp - self._stamp]))[:, 0]
+        time, *rates = self._clock.at(stamp)
+        rows = self.at(np.array([time]))[:, 0]
+        if tuple(rates) != STEADY:
+            scale(rows, tuple(rates))
+        motion[:, self.columns] = rows
 
     def samples(self, per_piece: int = 10) -> np.ndarray:
         """Return times (q,) [s] from the start for checks: several in every polynomial."""
@@ -106,12 +124,6 @@ class Blend:
     def stop(self) -> np.ndarray:
         """The values (k,) at which a motion stops within the blend's length."""
         return self.start[CHI] + self.start[CHI_DOT] * self.length / 2
-
-
-def still(stamp: float, reference: np.ndarray, columns: slice, p: MissionParameters) -> Plan:
-    """Return the plan that stops from reference (3, 6 + n) and remains there."""
-    blend = Blend.of(reference, columns, p)
-    return at_rest(stamp, blend, blend.stop, columns)
 
 
 def at_rest(stamp: float, blend: Blend, values: np.ndarray, columns: slice) -> Plan:

@@ -5,7 +5,7 @@
 | `~/start` | std_srvs/Trigger | arm and take off, if the pre-arm report is green |
 | `~/hold` | std_srvs/Trigger | stop on the path and hold the position |
 | `~/resume` | std_srvs/Trigger | continue on the path after a hold; regain a released vehicle |
-| `~/land` | std_srvs/Trigger | descend vertically and disarm |
+| `~/land` | std_srvs/Trigger | stop on a fast path, descend vertically and disarm |
 | `~/disarm` | std_srvs/Trigger | motors off: on the ground, or in failsafe |
 | `~/magnet` | std_srvs/SetBool | on or off until the scenario switches it next |
 

@@ -1,8 +1,31 @@
-"""The scenario's clock: it runs, slows down to a stop, restarts, or runs backwards."""
+"""The clock of a path: it runs, slows down to a stop, restarts, or runs backwards."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
+
+from uam_control.coordinates import CHI_DDOT, CHI_DOT, JERK, SNAP
+
+STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a time that passes as the stamps do
+
+
+def scale(path: np.ndarray, rates: tuple[float, float, float, float]) -> None:
+    """Apply the derivatives of the path's time to path (5, k), by the chain rule.
+
+    rates [1, 1/s, 1/s^2, 1/s^3]: first to fourth derivative.
+    """
+    one, two, three, four = rates
+    path[SNAP] = (
+        one**4 * path[SNAP]
+        + 6.0 * one**2 * two * path[JERK]
+        + (4.0 * one * three + 3.0 * two**2) * path[CHI_DDOT]
+        + four * path[CHI_DOT]
+    )
+    path[JERK] = one**3 * path[JERK] + 3.0 * one * two * path[CHI_DDOT] + three * path[CHI_DOT]
+    path[CHI_DDOT] = one**2 * path[CHI_DDOT] + two * path[CHI_DOT]
+    path[CHI_DOT] *= one
 
 
 class PathClock:
