@@ -196,7 +196,7 @@ class Reactions(ParameterSet):
         0.5, "acceleration of the reference when stopping or resuming", "m/s^2", 0.05, 10.0
     )
     travel_speed: float = number(
-        0.3, "peak speed in an unplanned landing; a path that is faster is stopped first", "m/s", 0.05, 3.0
+        0.3, "peak speed in an unplanned landing; a faster path is stopped first", "m/s", 0.05, 3.0
     )
     turn_rate: float = number(0.8, "peak yaw rate of the return to the path", "rad/s", 0.05, 3.0)
     stow_rate: float = number(0.8, "peak rate of the joints when stowing", "rad/s", 0.05, 5.0)
