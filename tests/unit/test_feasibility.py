@@ -310,3 +310,31 @@ def test_the_pre_arm_report_has_the_reference():
         replace(parameters, reference_thrust=45.0, reference_tilt=1.0, tilt_hold=1.04)
     )
     assert "thrust" not in mission.not_ready and "reference: tilt 1.04" in mission.not_ready
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "yaw", "complaint"),
+    [
+        ("quick_pick", (0.5, 0.0), 0.5, ""),
+        ("quick_pick", (0.0, 0.7), 0.0, "tilt 0.465 rad exceeds 0.35 rad at 0.3 s"),
+        ("quick_pick", (1.5, 1.0), 3.0, "tilt 0.9"),
+        ("pick_and_place", (1.5, 0.0), 0.0, ""),  # in 2 s: a quarter of the acceleration
+        ("pick_and_place", (2.0, 2.0), 0.0, "tilt 0.4"),
+        ("circle_fast", (2.0, 2.0), 3.0, ""),  # its way there is as long as it takes
+    ],
+)
+def test_moves_begin_near_their_place(name, place, yaw, complaint):
+    """d m in T s, minimum snap: 7.51 d / T^2; 0.7 m in 1 s needs atan(5.26 / 9.81) = 0.49 rad,
+    less as the climb begins."""
+    mission = Mission(
+        load_scenario(name), PROFILE.sets["mission"], vehicle=PROFILE.vehicle, compared=True
+    )
+    fresh = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
+    state = np.zeros((3, 8))
+    state[0, :3], state[0, 5], state[0, 6:] = (*place, 0.285), yaw, mission.scenario.arm_start
+    mission.step(0.0, state, None, fresh)
+    assert mission.not_ready.startswith(f"place: {complaint}" if complaint else "")
+    assert bool(mission.not_ready) is bool(complaint)
+    state[0, :3], state[0, 5] = (0.1, -0.1, 0.285), 0.1  # carried back
+    mission.step(1.0, state, None, fresh)
+    assert mission.start() == (True, "arming")

@@ -8,7 +8,7 @@ from the motion of the arm's masses.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,8 @@ BESIDE = 4  # further ones on both sides of a part: second derivatives there are
 CRAWL = 0.05  # [m/s] across: a vehicle that still stands on its gear turns over
 HARD = 1.0  # [m/s] sink rate at the ground that damages the gear
 ROUNDING = 1e-6  # [SI]
+DRAGGED = "height while it moves across"
+ACROSS = ("x", "y", "yaw")
 PRECISION = 1e-3  # of the slowdown, relative
 ROOM = 1.002  # by which the slowdown is larger than the least one found
 
@@ -121,6 +123,25 @@ class Feasibility:
                 found[one.quantity, one.limit] = worst._replace(first=known.first)
         return sorted(found.values(), key=lambda excess: excess.first)
 
+    def from_place(self, scenario: Scenario, start: np.ndarray) -> list[Excess]:
+        """Return what the first moves across exceed on a flight from chi start (6 + n,).
+
+        A route has a way there, whose length fits. Moves have fixed times: from a place far from
+        the first one's end they are hard. [] within all limits.
+        """
+        first: dict[str, float] = {}
+        for move in sorted(scenario.moves, key=lambda one: one.start):
+            if move.coordinate in ACROSS:
+                first.setdefault(move.coordinate, move.end)
+        if not first:
+            return []
+        times = np.arange(0.0, max(first.values()), STEP)
+        demand = self.along(scenario.trajectory(start), times, np.zeros(len(times)))
+        p = self.limits
+        stands = replace(p, reference_tilt=min(p.reference_tilt, p.start_tilt))
+        found = replace(self, limits=stands).exceeded(demand)
+        return [one for one in found if one.quantity != DRAGGED]
+
     def exceeded(self, demand: Demand, ground: float | None = None) -> list[Excess]:
         """Return every limit that a demand exceeds, the earliest first.
 
@@ -152,7 +173,7 @@ class Feasibility:
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
         height, sinking = self._near_ground(demand, ground)
-        lower.append(("height while it moves across", height, p.touchdown_height, "m"))
+        lower.append((DRAGGED, height, p.touchdown_height, "m"))
         upper.append(("sink rate near the ground", sinking, HARD, "m/s"))
         found = []
         for sign, checks in ((1.0, upper), (-1.0, lower)):

@@ -66,15 +66,18 @@ class Mission:
         parameters: MissionParameters,
         start: StartParameters | None = None,
         vehicle: VehicleDescription | None = None,
+        compared: bool = False,
     ) -> None:
-        """vehicle: whose limits the pre-arm report compares the reference with, if given."""
+        """vehicle: whose limits the pre-arm report compares the reference with, if given;
+        compared: the whole reference has been compared before, only its begin is."""
         self.scenario = self._planned = scenario
         self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
         self._start = start or StartParameters()
         self._stamp = 0.0
         self._age = 0.0  # [s] of the newest state: one tick
         self._seen: Observation | None = None
-        self._pre_arm = PreArm(scenario, self._start.require_checklist, vehicle)
+        checklist = self._start.require_checklist
+        self._pre_arm = PreArm(scenario, checklist, vehicle, compared)
         self._begin(parameters)
 
     def _begin(self, parameters: MissionParameters) -> None:

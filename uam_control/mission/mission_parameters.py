@@ -105,6 +105,9 @@ class MissionParameters(
     start_arm_error: float = number(
         0.3, "largest distance of a joint from its angle at the start", "rad", 0.01, 6.3
     )
+    start_tilt: float = number(
+        0.35, "largest tilt of the first moves across, which begin on the ground", "rad", 0.01, 1.5
+    )
     takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
     touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.15)
     touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 0.3)

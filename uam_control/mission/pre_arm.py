@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, CHI, POSITION, YAW
 from uam_control.mission.feasibility import Feasibility, in_words
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.permission import Permission
@@ -10,17 +13,26 @@ from uam_control.supervision import Observation, PreflightCheck, preflight
 from uam_control.supervision.checks import Checks
 from uam_control.vehicle import VehicleDescription
 
+MOVED = 0.02  # [m, rad] from which on a vehicle on the ground stands in another place
+
 
 class PreArm:
     """The report of one scenario; `permission`: of the checklist."""
 
     def __init__(
-        self, scenario: Scenario, require_checklist: bool, vehicle: VehicleDescription | None
+        self,
+        scenario: Scenario,
+        require_checklist: bool,
+        vehicle: VehicleDescription | None,
+        compared: bool = False,
     ) -> None:
         """require_checklist: no flight without its permission; vehicle: with whose limits the
-        reference is compared, None: it is not compared."""
+        reference is compared, None: it is not compared; compared: from the origin, it was before.
+        """
         self.permission = Permission(require_checklist)
-        self._scenario, self._vehicle = scenario, vehicle
+        self._scenario, self._vehicle, self._compared = scenario, vehicle, compared
+        self._stands: np.ndarray | None = None  # (4,) place and yaw of the line below
+        self._place: tuple[PreflightCheck, ...] = ()
         self._reference: tuple[PreflightCheck, ...] = ()
         self._checked: MissionParameters | None = None  # with which the reference was compared
 
@@ -28,7 +40,9 @@ class PreArm:
         """Compare the whole reference with the limits; the time grows with the flight's length."""
         if self._vehicle is None or parameters == self._checked:
             return
-        self._checked = parameters
+        self._checked, self._stands = parameters, None
+        if self._compared:
+            return
         check = Feasibility(self._vehicle, parameters, self._scenario.payload_mass)
         found = in_words(check.excesses(self._scenario))
         line = PreflightCheck("reference", found or "within", "within all limits", not found)
@@ -41,4 +55,23 @@ class PreArm:
         p = parameters
         arm = self._scenario.arm_start
         lines = preflight(checks, seen, arm, p.start_speed, p.start_arm_error)
-        return lines + self._reference + self.permission.lines(stamp)
+        self._look_at_place(seen.state[CHI], p)
+        return lines + self._reference + self._place + self.permission.lines(stamp)
+
+    def _look_at_place(self, chi: np.ndarray, parameters: MissionParameters) -> None:
+        """Compare the first moves from where the vehicle stands, chi (6 + n,), with the limits.
+
+        A person who carries the vehicle sees when its place is near enough.
+        """
+        stands = np.append(chi[POSITION], chi[YAW])
+        if self._vehicle is None or not np.isfinite(stands).all():
+            return
+        if self._stands is not None and np.abs(stands - self._stands).max() < MOVED:
+            return
+        self._stands, start = stands, chi.copy()
+        start[ATTITUDE] = 0.0, 0.0, chi[YAW]
+        start[ARM] = self._scenario.arm_start
+        check = Feasibility(self._vehicle, parameters, self._scenario.payload_mass)
+        found = in_words(check.from_place(self._scenario, start))
+        limit = "the first moves from here within all limits: carry it nearer to their end"
+        self._place = (PreflightCheck("place", found or "near enough", limit, not found),)

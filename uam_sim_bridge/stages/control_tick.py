@@ -22,6 +22,7 @@ from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
+from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint
 from uam_sim_bridge.stages.bridge_stage import BridgeStage
 
@@ -89,13 +90,16 @@ class ControlTick:
         sets: Mapping[str, ParameterSet],
         bridge: BridgeStage,
         timing: Timing,
+        vehicle: VehicleDescription | None = None,
     ) -> None:
-        """sets: parameters by the names of the nodes, see `Profile.sets`."""
+        """sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
+        begin of the reference is compared with, if given."""
         self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
         estimator, joints = sets["state_estimator"], len(scenario.arm_start)
         self.estimator = EstimatorStage(estimator, joints, timing.control_period)
-        mission = Mission(scenario, sets["mission"], StartParameters(auto_start=True))
+        start = StartParameters(auto_start=True)
+        mission = Mission(scenario, sets["mission"], start, vehicle, compared=True)
         self.mission = MissionStage(mission, timing)
         self.position = LawStage(PositionController(sets["position_controller"]), timing)
         self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)

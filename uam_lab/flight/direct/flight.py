@@ -64,7 +64,8 @@ class DirectFlight:
         bridge = BridgeStage(
             BridgeSets.of(described, section), described, self.autopilot, self.sequence
         )
-        self.control = ControlTick(scenario, sets, bridge, Timing(self.plant.period))
+        timing = Timing(self.plant.period)
+        self.control = ControlTick(scenario, sets, bridge, timing, described)
         if self._faults:
             self.autopilot.passes = self._faults.link.passes
             self.autopilot.receives = self._faults.link.receives
@@ -107,7 +108,8 @@ class DirectFlight:
                     break
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
                 reasons = "; ".join(self.sequence.reasons) or "no reason"
-                against = self.mission.beyond or f"the autopilot did not arm: {reasons}"
+                not_armed = f"the autopilot did not arm: {reasons}"
+                against = self.mission.beyond or self.mission.not_ready or not_armed
                 self.mission.give_up(plant.time, against)
             if plant.time >= self._limit:
                 self.ended_by = f"time limit of {self._limit:g} s"
