@@ -229,6 +229,17 @@ def test_a_landing_from_a_fast_path_stops_on_the_path_first(at):
     flight.assert_smooth()
 
 
+def test_a_goal_that_is_refused_on_a_fast_path_says_what_helps():
+    """The way to its rest, not the goal, is outside."""
+    flight = Flight("circle_fast")
+    flight.until(lambda output: output.time >= 12.0)
+    accepted, text = flight.mission.plan(GoalPose(np.array([0.0, 0.0, 1.5])))
+    assert not accepted and text.endswith("(on a fast path: /mission/hold first)")
+    assert flight.mission.request(OperatorCommand.HOLD)[0]
+    flight.step(800)
+    assert flight.mission.plan(GoalPose(np.array([0.0, 0.0, 1.5])))[0]
+
+
 def test_a_landing_from_a_fast_plan_stops_on_the_plan_first():
     flight = Flight("hover")
     flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)

@@ -302,7 +302,8 @@ class Mission:
             made = goal.plan(self._stamp, motion, parameters)
             check(made, parameters, self._ground)
         except PlanRefused as error:
-            return False, f"refused: {error}"
+            hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
+            return False, f"refused: {error}{hint}"
         self._requests.append((OperatorCommand.GOAL, goal))
         return True, f"accepted: at the end in {made.end - self._stamp:.1f} s"
 
