@@ -10,8 +10,9 @@ import pytest
 
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
-from uam_control.grasp.evidence import Load, by_mass, by_travel, identified_mass
+from uam_control.grasp.evidence import Load, by_mass, by_pose, by_travel, identified_mass
 from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.place_history import PlaceHistory
 from uam_control.grasp.sight import RunningMean
 from uam_control.mission import load_scenario
 
@@ -111,6 +112,43 @@ def test_a_running_mean_has_the_mean_and_the_deviation_of_its_values():
     assert mean.deviation == pytest.approx([0.0, 0.5], abs=0.2)
     mean.add(40.0, np.array([math.nan, 0.0]))
     assert mean.span(41.0) == -math.inf
+
+
+def test_a_fast_payload_is_compared_with_the_magnet_of_its_poses_stamp():
+    """At 5 m/s a pose that is 100 ms old lies 0.5 m behind the magnet."""
+    places, velocity = PlaceHistory(), np.array([5.0, 0.0, 0.0])
+    for k in range(1000):  # the ring is written over
+        places.add(STEP * k, PLACE + velocity * STEP * k)
+    now, seen = STEP * 999, STEP * 999 - 0.107
+    carried = PLACE + velocity * seen
+    sight = Sight(now, 50.0, PLACE + velocity * now, payload=carried, magnet_then=places.at(seen))
+    assert by_pose(sight, P).text == "payload 0 mm from the magnet"
+    begin = PLACE + velocity * STEP * 900
+    assert by_travel(sight, begin, begin, P).held
+    sight.payload = PLACE  # it stayed where it was
+    assert by_travel(sight, begin, begin, P).held is False
+
+
+def test_places_between_beside_and_outside_the_known_ones():
+    places = PlaceHistory()
+    assert np.isnan(places.at(1.0)).all()
+    places.add(1.0, np.zeros(3))
+    assert places.at(1.0) == pytest.approx(np.zeros(3)) and np.isnan(places.at(1.01)).all()
+    places.add(1.02, np.array([0.2, 0.0, 0.0]))
+    assert places.at(1.005) == pytest.approx([0.05, 0.0, 0.0])
+    assert places.at(1.024) == pytest.approx([0.24, 0.0, 0.0])  # a pose newer than the state
+    for unknown in (0.99, 1.2, math.nan):
+        assert np.isnan(places.at(unknown)).all()
+    places.add(0.5, np.ones(3))  # time went back
+    assert np.isnan(places.at(1.0)).all() and places.at(0.5) == pytest.approx(np.ones(3))
+
+
+def test_a_pose_of_an_unknown_place_has_no_verdict():
+    sight = Sight(1.0, 50.0, PLACE, payload=PLACE + [0.5, 0.0, 0.0])
+    assert by_pose(sight, P).held is False
+    sight.magnet_then = np.full(3, math.nan)
+    assert by_pose(sight, P).held is None
+    assert by_travel(sight, PLACE, PLACE, P).held is None
 
 
 class Flight:

@@ -48,7 +48,9 @@ def by_pose(sight: Sight, p: GraspParameters) -> Evidence:
     """Return the evidence of the payload's distance from the magnet; it cannot tell held."""
     if not sight.tracked:
         return Evidence(None, "payload not tracked")
-    apart = math.dist(sight.payload.tolist(), sight.magnet.tolist())
+    apart = math.dist(sight.payload.tolist(), sight.magnet_then.tolist())
+    if math.isnan(apart):
+        return Evidence(None, "payload's pose of an unknown place of the magnet")
     if apart > p.held_distance:
         return Evidence(False, f"{1e3 * apart:.0f} mm from the payload at {place(sight.payload)}")
     return Evidence(None, f"payload {1e3 * apart:.0f} mm from the magnet")
@@ -59,13 +61,13 @@ def by_travel(
 ) -> Evidence:
     """Return the evidence of the payload's pose: near the magnet, and moved with it.
 
-    magnet, payload (3,) [m]: face and grip point when the magnet came on. The direction does not
-    matter: an arm that turns meanwhile may lower the magnet as much as the vehicle climbs.
+    magnet, payload (3,) [m]: `magnet_then` and grip point when the magnet came on. The direction
+    does not matter: an arm that turns meanwhile may lower the magnet as much as the vehicle climbs.
     """
     near = by_pose(sight, p)
     if near.held is False or not sight.tracked:
         return near
-    travel, moved = sight.magnet - magnet, sight.payload - payload
+    travel, moved = sight.magnet_then - magnet, sight.payload - payload
     length = float(np.linalg.norm(travel))
     along = float(moved @ travel) / max(length, 1e-9)
     if math.isnan(along):

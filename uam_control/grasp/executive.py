@@ -166,7 +166,7 @@ class GraspExecutive:
         elif sight.tracked and not self.directive.grip:
             self.directive.grip = touches_beside(sight, self._grip_tolerance)
         if self._step is Step.DESCEND and sight.time >= window.grip:
-            self._gripped[:] = sight.magnet, sight.payload
+            self._gripped[:] = sight.magnet_then, sight.payload
             self._go(Step.LIFT, sight)
 
     @property

@@ -17,10 +17,14 @@ class Sight:
     """What a vehicle can measure for a grasp.
 
     stamp [s]; time [s]: of the scenario; magnet (3,) [m, world]: face, from the estimate; error
-    (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose; lift
+    (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose;
+    magnet_then (3,) [m, world]: magnet at the stamp of that pose, default: no delay; lift
     [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
     horizontal distance of the magnet from that joint; on_path: whether the vehicle flies on the
     path, and not on its way back to it. NaN: unknown.
+
+    A payload that stands is compared with `magnet`, its old pose is still true. One that may hang
+    on the magnet is compared with `magnet_then`.
     """
 
     stamp: float
@@ -32,6 +36,11 @@ class Sight:
     effort: float = math.nan
     lever: float = 0.0
     on_path: bool = True
+    magnet_then: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.magnet_then is None:
+            self.magnet_then = self.magnet
 
     @property
     def tracked(self) -> bool:

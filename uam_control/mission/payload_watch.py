@@ -9,11 +9,13 @@ import numpy as np
 from uam_control.coordinates import ALPHA, CHI, POSITION, Z
 from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight, grasp_windows
 from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.place_history import PlaceHistory
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.shift import Shift
+from uam_control.stamps import MOST_AHEAD
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive
@@ -57,6 +59,7 @@ class PayloadWatch:
         self._shift = Shift()
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
+        self._places = PlaceHistory()  # of the magnet
         self._left_out: GraspWindow | None = None
 
     @property
@@ -81,6 +84,7 @@ class PayloadWatch:
     def interrupt(self) -> None:
         """The scenario is not flown at this tick."""
         self.executive.interrupt()
+        self._places.restart()  # the vehicle moves on unseen
 
     def step(self, stamp: float, state: np.ndarray, readings: Readings) -> str:
         """Step the executive at `stamp` [s] if it is due; apply its directive.
@@ -108,6 +112,7 @@ class PayloadWatch:
         known = len(p.arm_links) == len(chi) - ALPHA
         links = self._links if known else np.zeros(len(chi) - ALPHA)
         magnet, arm = magnet_and_lever(chi, self._mount, links, p.magnet_length)
+        self._places.add(readings.stamp, magnet)
         sight = Sight(
             stamp,
             self._guidance.scenario_time,
@@ -117,8 +122,9 @@ class PayloadWatch:
             lever=arm,
             on_path=not self._guidance.coming_back,
         )
-        if known and readings.payload_age <= p.payload_age:
+        if known and -MOST_AHEAD <= readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
+            sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
         if len(readings.joint_effort):
             sight.effort = float(readings.joint_effort[0])
         return sight

@@ -137,6 +137,7 @@ class Inputs:
         readings.missed_ticks = float(sum(missed for _, missed in gaps)) if gaps else 0.0
         if self._bias is not None and stamp - self._bias[1] > BIAS_VALID:
             readings.contradiction = math.nan
+        readings.stamp = stamp
         readings.mocap_age = stamp - self._mocap
         readings.mocap_still = stamp - self._moved
         readings.joint_age = stamp - self._joints

@@ -41,8 +41,9 @@ class Authority(NamedTuple):
 class Readings:
     """Readings besides state and reference; NaN means unknown and has no effect.
 
-    battery: state of charge 0..1. mocap_age, joint_age [s]: of the newest message, by its stamp;
-    mocap_still [s]: since the last change of the pose; mocap_position (3,) [m]: of the newest pose;
+    stamp [s]: of the tick, and of its state. battery: state of charge 0..1. mocap_age, joint_age
+    [s]: of the newest message, by its stamp; mocap_still [s]: since the last change of the pose;
+    mocap_position (3,) [m]: of the newest pose;
     controller_age [s]: of the newest gains of each controller, the largest age;
     pose_controller_age [s]: the same without the arm controller. autopilot_age [s]: since the
     bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link;
@@ -74,6 +75,7 @@ class Readings:
     lift: float = math.nan
     contradiction: float = math.nan
     slower: float = math.nan
+    stamp: float = math.nan
 
 
 @dataclass
