@@ -182,11 +182,13 @@ class Flight:
         self.gust = lambda time: 0.0  # [N]
 
     def magnet(self):
+        return self.planned(self.time) + self.shift + self.error + self.noise()
+
+    def planned(self, time):
+        """The magnet on the path of the scenario."""
         motion = np.zeros((MOTION_ROWS, 8))
-        self.path.write(self.time, motion)
-        chi = motion[0]
-        chi[:3] += self.shift + self.error + self.noise()
-        return magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)[0]
+        self.path.write(time, motion)
+        return magnet_and_lever(motion[0], (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)[0]
 
     def attempt(self):
         decisions = self.executive.decisions
@@ -204,6 +206,8 @@ class Flight:
             self.carried, self.payload[2] = False, 0.05
         payload = self.payload if self.tracked else np.full(3, np.nan)
         load = self.mass * 9.81 * self.carried
+        window = self.executive.aligns_for
+        ahead = self.planned(window.descent) - self.planned(self.time) if window else np.zeros(3)
         directive = self.executive.step(
             Sight(
                 self.stamp,
@@ -214,6 +218,7 @@ class Flight:
                 lift=21.6 + load + self.gust(self.stamp),
                 effort=0.5 + 0.2 * load,
                 lever=0.2,
+                ahead=ahead,
             )
         )
         self.shift = self.shift + 0.05 * (directive.shift - self.shift)
@@ -294,6 +299,42 @@ def test_an_absent_payload_costs_no_time(where):
     assert flight.until() == [Grasp.ABSENT]
     assert flight.executive.directive.without_descent == flight.windows[0]
     assert flight.stamp - 128.0 == pytest.approx(75.0 - 28.0, abs=2 * STEP)
+
+
+def test_an_absent_payload_may_land():
+    flight = Flight(lambda attempt: False, grasp_given_up="land")
+    flight.payload = np.array([5.0, 5.0, 0.04])
+    while not flight.step().land:
+        assert flight.stamp < 140.0
+    text = "absent, not within 0.08 m of its place; payload at (5.00, 5.00, 0.04) m"
+    assert flight.executive.directive.land == text
+
+
+@pytest.mark.parametrize("error", [0.0, 0.1])
+def test_a_vehicle_that_arrives_late_does_not_take_its_payload_for_absent(error):
+    """The path ends where the descent begins, and a gust holds the vehicle off: both pass."""
+    flight = Flight(lambda attempt: True, scenario="quick_pick")
+    flight.error = np.array([error, 0.0, 0.0])
+    while flight.stamp < 100.0 + flight.windows[0].descent + 1.0:
+        flight.step()
+    assert flight.executive.grasp is (Grasp.NONE if error else Grasp.APPROACHED)
+    assert np.max(np.abs(flight.executive.directive.shift[:2])) < 1e-3
+    flight.error[:] = 0.0
+    assert flight.until(flight.windows[0].release + 2.0)[-2:] == [Grasp.HELD, Grasp.RELEASED]
+
+
+def test_a_payload_just_out_of_reach_is_looked_at_twice():
+    flight = Flight(lambda attempt: True, offset=(0.1, 0.0))
+    begin = 100.0 + flight.windows[0].descent
+    while flight.executive.grasp is Grasp.NONE:
+        flight.step()
+    assert flight.executive.grasp is Grasp.ABSENT
+    assert 2.0 <= flight.stamp - begin < 2.2
+    flight = Flight(lambda attempt: True, offset=(0.1, 0.0))
+    while flight.stamp < begin + 1.0:
+        flight.step()
+    flight.payload = PLACE.copy()  # somebody has put it right
+    assert flight.until()[-2:] == [Grasp.HELD, Grasp.RELEASED]
 
 
 def test_without_mocap_of_the_payload_the_mass_decides():

@@ -62,6 +62,19 @@ def test_a_vehicle_that_stays_on_the_ground_has_not_completed_its_mission():
     assert "never took off" not in metrics.compute(made.series(), INFO)["shortfalls"]
 
 
+@pytest.mark.parametrize(
+    ("grasp", "mass", "missing"),
+    [("absent", 0.2, True), ("given up", 0.2, True), ("absent", 0.0, False), ("lost", 0.2, False)],
+)
+def test_a_payload_that_was_left_where_it_is_is_missing(grasp, mass, missing):
+    made = flight()
+    made.values[:, COLUMNS["magnet.on"]] = 0.0
+    told = [{"time_s": 1.0, "grasp": grasp, "attempt": 1, "text": "it is elsewhere"}]
+    result = metrics.compute(made.series(), INFO | {"grasps": told, "payload_mass_kg": mass})
+    assert result["shortfalls"] == (["payload it is elsewhere"] if missing else [])
+    assert result["mission_completed"] is not missing
+
+
 def test_rms_and_maximum_run_over_the_flight_only():
     made = flight()
     made.values[:, COLUMNS["truth.y"]] = 0.0

@@ -236,6 +236,8 @@ def test_outcomes_in_words():
     assert flight_summary.payload_story({"payload_lifted": None}) == "no payload in this flight"
     never = {"payload_lifted": None, "payload_mass_kg": 0.2}
     assert flight_summary.payload_story(never) == "the magnet was never on"
+    absent = never | {"grasp": {"decisions": [{"text": "absent; payload at (5, 5, 0) m"}]}}
+    assert flight_summary.payload_story(absent) == "absent; payload at (5, 5, 0) m"
     assert flight_summary.payload_story({"payload_lifted": False}) == "not lifted"
     story = {"payload_lifted": True, "payload_place_error_m": 0.034}
     assert flight_summary.payload_story(story) == "lifted, came to rest 3.4 cm from the drop point"

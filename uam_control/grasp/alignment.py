@@ -2,14 +2,16 @@
 
 The correction contains the place of the payload and the mean attitude and joint errors, which no
 other part corrects. It leaves out the position error: the position law corrects it, and a second
-correction of the same error would follow every gust.
+correction of the same error would follow every gust. It leaves out the path that is still ahead,
+too: otherwise a vehicle that arrives just before the descent would count as beside the payload.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from uam_control.coordinates import Z
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import RunningMean, Sight
 
@@ -45,7 +47,7 @@ class Alignment:
             self._tracked = sight.tracked
         self._stamp = sight.stamp
         if sight.tracked:
-            away = sight.magnet - sight.payload - [0.0, 0.0, dip]
+            away = sight.magnet + sight.ahead - sight.payload - [0.0, 0.0, dip]
             self._constant.add(sight.stamp, away - sight.error)
         else:
             away = sight.error * [1.0, 1.0, 0.0]
@@ -82,8 +84,16 @@ class Alignment:
         return f"{1e3 * self.distance:.0f} mm off the {of}, swing {1e3 * self.swing:.0f} mm"
 
     def near(self, distance: float) -> bool:
-        """Return whether the payload is within `distance` [m], across and in height; known."""
-        return self.known and max(self.distance, abs(self._distance.mean.item(Z))) <= distance
+        """Return whether the payload is within `distance` [m] of its place on the path, across and
+        in height; known."""
+        if not self.known:
+            return False
+        x, y, z = (self._constant if self._tracked else self._distance).mean.tolist()
+        return max(math.hypot(x, y), abs(z)) <= distance
+
+    def settled(self) -> bool:
+        """Return whether the distance was measured for PAUSE: longer than a gust."""
+        return self._distance.span(self._stamp) >= PAUSE
 
     def correction(self, shift: np.ndarray, p: GraspParameters, worth: float = WORTH) -> np.ndarray:
         """Return the new shift (3,) [m] of the path in place of `shift` (3,).

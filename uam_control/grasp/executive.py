@@ -31,6 +31,7 @@ from uam_control.grasp.sight import Lasting, RunningMean, Sight
 from uam_control.grasp.windows import GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken
+FAR = 2.0  # of the reach: a payload beyond is out of reach without a second look
 FALLEN = 0.05  # [m] below its place from which on a payload counts as fallen from its stand
 NEAR = 0.015  # [m] height above the payload below which a miss breaks off the descent
 BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
@@ -71,6 +72,12 @@ class GraspExecutive:
             Step.CARRY: self._carry,
             Step.RELEASE: self._release,
         }
+
+    @property
+    def aligns_for(self) -> GraspWindow | None:
+        """Return the window whose descent has not begun, None without one."""
+        before = self._step in (Step.IDLE, Step.APPROACH, Step.ALIGN)
+        return self._windows[0] if before and self._windows else None
 
     def due(self, time: float) -> bool:
         """Return whether a window is near at scenario time [s]."""
@@ -125,12 +132,12 @@ class GraspExecutive:
                 self.directive.shift = alignment.correction(shift, p, p.align_tolerance)
             return
         self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
-        if sight.tracked and alignment.known and not alignment.near(p.align_range):
-            self._attempt = 1
-            where = place(sight.payload)
-            self._decide(sight, Grasp.ABSENT, f"no payload below; payload at {where}")
-            self.directive = Directive(without_descent=window)
-            self._end()
+        beyond = sight.tracked and alignment.known and not alignment.near(self._reach)
+        if beyond and not alignment.near(FAR * self._reach):
+            self._leave_out(sight, window)
+        elif beyond:
+            alignment.restart()  # above the payload it is measured once more
+            self._go(Step.ALIGN, sight, pace=0.0)
         elif alignment.good(p):
             self._begin_descent(sight)
         else:
@@ -140,7 +147,11 @@ class GraspExecutive:
         p, alignment = self.parameters, self._alignment
         alignment.add(sight, window.dip)
         late = self._waited(sight) >= p.align_timeout
-        if alignment.good(p) or (late and alignment.good(p, LATE)):
+        first_look = sight.tracked and not self._attempt
+        if first_look and alignment.known and not alignment.near(self._reach):
+            if alignment.settled():
+                self._leave_out(sight, window)
+        elif alignment.good(p) or (late and alignment.good(p, LATE)):
             self._begin_descent(sight)
         elif late and (alignment.known or self._waited(sight) >= LATE * p.align_timeout):
             self._attempt += 1
@@ -149,6 +160,17 @@ class GraspExecutive:
             self._again_or_give_up(sight, window)
         else:
             self.directive.shift = alignment.correction(self.directive.shift, p)
+
+    @property
+    def _reach(self) -> float:
+        """Largest distance [m] of a payload from its place at which it is approached."""
+        return max(self.parameters.align_range, self.parameters.descent_miss)
+
+    def _leave_out(self, sight: Sight, window: GraspWindow) -> None:
+        """Fly on without a payload that is not in its place."""
+        self._attempt += 1
+        text = f"absent, not within {self._reach:g} m of its place"
+        self._leave(sight, window, Grasp.ABSENT, f"{text}; payload at {place(sight.payload)}")
 
     def _begin_descent(self, sight: Sight) -> None:
         self._attempt += 1
@@ -244,7 +266,7 @@ class GraspExecutive:
         self._alignment.restart()
         if sight.tracked and self._stood[2] - sight.payload[2] > FALLEN:
             reason = "fallen from its place"
-        elif sight.tracked and np.hypot(*(sight.payload - self._start)[:2]) > 2.0 * p.align_range:
+        elif sight.tracked and np.hypot(*(sight.payload - self._start)[:2]) > FAR * self._reach:
             reason = "out of reach"
         elif self._attempt >= p.grasp_attempts:
             reason = f"{self._attempt} approaches"
@@ -252,9 +274,13 @@ class GraspExecutive:
             self._go(Step.ALIGN, sight, pace=0.0)
             return
         where = f"; payload at {place(sight.payload)}" if sight.tracked else ""
-        self._decide(sight, Grasp.GIVEN_UP, f"given up, {reason}{where}")
+        self._leave(sight, window, Grasp.GIVEN_UP, f"given up, {reason}{where}")
+
+    def _leave(self, sight: Sight, window: GraspWindow, grasp: Grasp, text: str) -> None:
+        """Leave the payload where it is: go on without the descent, or land."""
+        self._decide(sight, grasp, text)
         self.directive = Directive(without_descent=window)
-        if p.grasp_given_up == "land":
+        if self.parameters.grasp_given_up == "land":
             self.directive.land = self.decisions[-1].text
         self._end()
 

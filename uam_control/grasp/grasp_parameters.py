@@ -57,8 +57,9 @@ class GraspParameters(ParameterSet):
         "go_on", "reaction to a lost payload: go_on with the scenario, or land", ("go_on", "land")
     )
     grasp_given_up: str = choice(
-        "go_on", "reaction to a payload that is given up: go_on, or land", ("go_on", "land")
-    )
+        "go_on", "reaction to a payload that is given up or absent: go_on, or land",
+        ("go_on", "land"),
+    )  # fmt: skip
     contact_error: float = number(
         0.10, "position error near the payload that counts as a contact of the arm", "m", 0.02, 1.0
     )

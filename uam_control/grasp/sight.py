@@ -18,7 +18,8 @@ class Sight:
 
     stamp [s]; time [s]: of the scenario; magnet (3,) [m, world]: face, from the estimate; error
     (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose;
-    magnet_then (3,) [m, world]: magnet at the stamp of that pose, default: no delay; lift
+    magnet_then (3,) [m, world]: magnet at the stamp of that pose, default: no delay; ahead (3,)
+    [m]: way of the magnet on the path from now until the descent begins; lift
     [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
     horizontal distance of the magnet from that joint; on_path: whether the vehicle flies on the
     path, and not on its way back to it. NaN: unknown.
@@ -37,6 +38,7 @@ class Sight:
     lever: float = 0.0
     on_path: bool = True
     magnet_then: np.ndarray | None = None
+    ahead: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         if self.magnet_then is None:

@@ -60,6 +60,7 @@ class PayloadWatch:
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
         self._places = PlaceHistory()  # of the magnet
+        self._planned: tuple[GraspWindow, np.ndarray] | None = None  # magnet at its descent
         self._left_out: GraspWindow | None = None
 
     @property
@@ -125,6 +126,21 @@ class PayloadWatch:
         if known and -MOST_AHEAD <= readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
             sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
+            self._look_ahead(sight)
         if len(readings.joint_effort):
             sight.effort = float(readings.joint_effort[0])
         return sight
+
+    def _look_ahead(self, sight: Sight) -> None:
+        """Set the magnet's way on the path until the descent begins, without the path's shift."""
+        window = self.executive.aligns_for
+        if window is None:
+            return
+        guidance, length = self._guidance, self._parameters.magnet_length
+        if self._planned is None or self._planned[0] is not window:
+            motion = np.zeros_like(guidance.motion)
+            guidance.trajectory.write(window.descent, motion)
+            at, _ = magnet_and_lever(motion[CHI], self._mount, self._links, length)
+            self._planned = window, at
+        now, _ = magnet_and_lever(guidance.reference[CHI], self._mount, self._links, length)
+        sight.ahead = self._planned[1] - now + self._shift.value

@@ -34,6 +34,11 @@ class Shift:
         length = max(SHORTEST, PEAK * way / SPEED)
         self._segment = Segment(stamp, self._values, goal, np.full(3, length))
 
+    @property
+    def value(self) -> np.ndarray:
+        """Return the present shift (3,) [m]; read only."""
+        return self._values[CHI]
+
     def advance(self, stamp: float) -> None:
         """Set the shift for `stamp` [s]; call it before `add`."""
         if self._segment is not None:

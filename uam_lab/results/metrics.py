@@ -85,6 +85,7 @@ def compute(
         payload=payload,
         criteria=criteria,
         grasps=info.get("grasps") or [],
+        to_carry=bool(info.get("payload_mass_kg")),
     )
     duration = _span(series.time[series.flown])
     wall = info.get("wall_s")
@@ -228,10 +229,11 @@ def what_is_missing(
     payload: Payload,
     criteria: Criteria,
     grasps: Sequence[Mapping[str, Any]] = (),
+    to_carry: bool = False,
 ) -> list[str]:
     """Return the unmet criteria of a completed mission, one line each.
 
-    landing_error_m: None if it has not landed.
+    landing_error_m: None if it has not landed; to_carry: whether there is a payload.
     """
     if abort_reason:
         return [f"aborted: {abort_reason}"]
@@ -242,8 +244,7 @@ def what_is_missing(
         missing.append("not landed")
     elif not landing_error_m <= criteria.landing_m:
         missing.append(f"landed {landing_error_m:.2f} m from the landing point")
-    given_up = grasp_facts(grasps)["state"] == Grasp.GIVEN_UP.value
-    if given_up and not payload.lifted:
+    if left_behind(grasps, to_carry) and not payload.lifted:
         missing.append(f"payload {grasps[-1]['text']}")
     elif payload.lifted is False:
         missing.append(f"payload not lifted (rose {payload.lift_height_m:.3f} m)")
@@ -253,6 +254,15 @@ def what_is_missing(
         elif not payload.at_rest:
             missing.append("payload still moving at the end")
     return missing
+
+
+def left_behind(grasps: Sequence[Mapping[str, Any]], to_carry: bool) -> bool:
+    """Return whether a payload was left where it is: given up, or absent although it is `to_carry`.
+
+    grasps: see `outcome`. A flight without payload finds none, as it should.
+    """
+    state = grasp_facts(grasps)["state"]
+    return state == Grasp.GIVEN_UP.value or (to_carry and state == Grasp.ABSENT.value)
 
 
 def grasp_facts(grasps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -104,8 +104,10 @@ def verdict(metrics: Mapping[str, Any]) -> str:
 def payload_story(metrics: Mapping[str, Any]) -> str:
     """Return the result of the payload's transport, in one line."""
     if metrics.get("payload_lifted") is None:
-        there = metrics.get("payload_mass_kg")
-        return "the magnet was never on" if there else "no payload in this flight"
+        if not metrics.get("payload_mass_kg"):
+            return "no payload in this flight"
+        decisions = (metrics.get("grasp") or {}).get("decisions")
+        return decisions[-1]["text"] if decisions else "the magnet was never on"
     if not metrics["payload_lifted"]:
         return "not lifted"
     error = metrics.get("payload_place_error_m")
