@@ -36,6 +36,13 @@ def checked(limits=OPEN, payload=0.0):
     return Feasibility(PROFILE.vehicle, limits, payload)
 
 
+def with_full_thrust(full):
+    """The S-500 with another full thrust [N]."""
+    vehicle = PROFILE.vehicle
+    coefficient = full / len(vehicle.rotors) / vehicle.rotor.speed_max**2
+    return replace(vehicle, rotor=replace(vehicle.rotor, thrust_coefficient=coefficient))
+
+
 def scenario_of(folder, text):
     file = folder / "made.yaml"
     file.write_text(text)
@@ -206,6 +213,27 @@ def test_a_place_outside_the_geofence_is_not_retimed(tmp_path):
         checked().retimed(circle(tmp_path, more=", centre: [5, 0]"))
 
 
+@pytest.mark.parametrize(
+    ("full", "limit"),
+    # 36 N of a profile: it leaves at least 3 % of the full thrust, or the limit is 85 % of that
+    [(41.4, 36.0), (37.2, 36.0), (37.0, 31.45), (28.05, 23.8425)],
+)
+def test_the_vehicles_own_full_thrust_limits_a_reference(full, limit):
+    check = Feasibility(with_full_thrust(full), OPEN, 0.2)
+    assert check.thrust_limit == pytest.approx(limit)
+
+
+def test_what_a_weak_vehicle_cannot_lift_is_refused_and_retimed():
+    weak = Feasibility(with_full_thrust(28.06), OPEN, 0.2)
+    race = load_scenario("race_5_payload")
+    with pytest.raises(InfeasibleReference, match="thrust 29.5 N exceeds 23.9 N, 85 % of the full"):
+        weak.check(race)
+    with pytest.raises(InfeasibleReference, match=r"thrust .* exceeds 23.9 N.* does not help"):
+        replace(weak, payload_mass=0.7).retimed(race)  # the weight alone is 28.4 N
+    retimed, factor = replace(weak, payload_mass=0.0).retimed(load_scenario("ellipse"))
+    assert 1.5 < factor < SLOWEST
+
+
 HARD = replace(OPEN, reference_thrust=19.0, reference_tilt=0.1, tilt_hold=0.3)
 
 
@@ -298,8 +326,9 @@ def test_the_second_flight_is_compared_with_the_limits_of_its_time():
 
 def test_the_pre_arm_report_has_the_reference():
     parameters = PROFILE.sets["mission"]
+    strong = with_full_thrust(50.0)
     for name, passed in (("hover", True), ("ellipse", False)):
-        mission = Mission(load_scenario(name), parameters, vehicle=PROFILE.vehicle)
+        mission = Mission(load_scenario(name), parameters, vehicle=strong)
         state = np.zeros((3, 8))
         state[0, 2], state[0, 6:] = 0.285, mission.scenario.arm_start
         mission.step(0.0, state, None)

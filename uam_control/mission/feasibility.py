@@ -28,6 +28,10 @@ PART = 60000  # checks in one part of a long flight
 BESIDE = 4  # further ones on both sides of a part: second derivatives there are those of the whole
 CRAWL = 0.05  # [m/s] across: a vehicle that still stands on its gear turns over
 HARD = 1.0  # [m/s] sink rate at the ground that damages the gear
+# Of the full thrust: a limit above the first is not this vehicle's, the second replaces it. Rotors
+# at their limit cannot turn the vehicle; with the second they still can.
+LARGEST, USABLE = 0.97, 0.85
+THRUST = "thrust"
 ROUNDING = 1e-6  # [SI]
 DRAGGED = "height while it moves across"
 ACROSS = ("x", "y", "yaw")
@@ -40,7 +44,10 @@ class InfeasibleReference(ScenarioError):
 
 
 class Excess(NamedTuple):
-    """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins."""
+    """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins.
+
+    origin: of a limit that is in no parameter, in words.
+    """
 
     quantity: str
     value: float
@@ -48,13 +55,15 @@ class Excess(NamedTuple):
     unit: str
     time: float
     first: float
+    origin: str = ""
 
     @property
     def text(self) -> str:
         """The excess in words."""
         beyond = "exceeds" if self.value > self.limit else "is below"
+        limit = f"{self.limit:.3g} {self.unit}" + (f", {self.origin}," if self.origin else "")
         return (
-            f"{self.quantity} {self.value:.3g} {self.unit} {beyond} {self.limit:.3g} {self.unit} "
+            f"{self.quantity} {self.value:.3g} {self.unit} {beyond} {limit} "
             f"at {self.time:.1f} s (from {self.first:.1f} s on)"
         )
 
@@ -153,7 +162,7 @@ class Feasibility:
         high[Z] = min(high[Z], ground + p.altitude_hold)
         rates = np.abs(demand.body_rates).max(axis=1)
         upper = [
-            ("thrust", demand.thrust, p.reference_thrust, "N"),
+            (THRUST, demand.thrust, self.thrust_limit, "N"),
             ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
             ("body rate", rates, p.body_rate_hold, "rad/s"),
         ]
@@ -182,7 +191,9 @@ class Feasibility:
                 if beyond.any():
                     worst, first = int(np.nanargmax(sign * values)), int(np.argmax(beyond))
                     at = float(demand.times[worst]), float(demand.times[first])
-                    found.append(Excess(quantity, float(values[worst]), float(limit), unit, *at))
+                    origin = self._origin if quantity == THRUST else ""
+                    excess = Excess(quantity, float(values[worst]), float(limit), unit, *at, origin)
+                    found.append(excess)
         return sorted(found, key=lambda excess: excess.first)
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
@@ -196,6 +207,18 @@ class Feasibility:
         drags = across & ~np.maximum.accumulate(airborne)
         lands = ~across & ~airborne
         return np.where(drags, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
+
+    @property
+    def thrust_limit(self) -> float:
+        """Largest force [N] of a reference: `reference_thrust`, if the vehicle has that much."""
+        return USABLE * self.vehicle.full_thrust if self._origin else self.limits.reference_thrust
+
+    @property
+    def _origin(self) -> str:
+        """Return where the limit of the thrust is from, in words; "": from the parameter."""
+        if self.limits.reference_thrust <= LARGEST * self.vehicle.full_thrust:
+            return ""
+        return f"{USABLE:.0%} of the full thrust".replace("%", " %")
 
     def check(self, scenario: Scenario) -> None:
         """Raise InfeasibleReference if the scenario exceeds a limit."""

@@ -161,10 +161,15 @@ class VehicleDescription:
         return float(f"{self.rotor.thrust_max:.4g}")
 
     @property
+    def full_thrust(self) -> float:
+        """Nominal full thrust of all rotors [N]."""
+        return len(self.rotors) * self.rotor.thrust_max
+
+    @property
     def hover_command(self) -> float:
         """Normalised thrust in hover [1], to 1 %: weight / full thrust, as THR_MDL_FAC
         linearises."""
-        return round(self.mass * self.gravity / (len(self.rotors) * self.rotor.thrust_max), 2)
+        return round(self.mass * self.gravity / self.full_thrust, 2)
 
     def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return px, py, km, each (rotors,) [m], in PX4's convention and motor order.
