@@ -6,7 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
+from uam_control.mission.scenarios.fitted_spline import (
+    CurveSamples,
+    Misfit,
+    _band_solved,
+    fitted,
+)
 
 HEADER = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
@@ -210,3 +215,62 @@ def test_between_few_samples_the_curve_goes_straight_on(times):
     found = path.rows(within)
     np.testing.assert_allclose(found[0], np.stack([2.0 * within, 1.0 - within], 1), atol=1e-5)
     np.testing.assert_allclose(found[2], 0.0, atol=1e-2)
+
+
+PLAIN = "t,px,py,pz"
+SQUARE = ("0,0,0,1", "2,1,0,1", "4,1,1,1", "6,0,1,1", "8,0,0,1")
+
+
+def flown(folder, rows, header=PLAIN):
+    path = trajectory_of(load_scenario(csv_file(folder, header, rows)))
+    return path.rows(np.linspace(0.0, path.length, 500))[0]
+
+
+def test_two_rows_far_apart_are_a_straight_way_with_the_arm_at_rest(tmp_path):
+    found = flown(tmp_path, ("0,0,0,1", "8,1,0,1"))
+    np.testing.assert_allclose(found[:, 0], np.linspace(0.0, 1.0, 500), atol=1e-6)
+    np.testing.assert_allclose(found[:, 1:], np.tile(found[0, 1:], (500, 1)), atol=1e-9)
+
+
+def test_a_long_pause_of_a_dense_file_is_a_pause(tmp_path):
+    rest = np.arange(0.0, 5.0, 0.1)
+    rows = [f"{t:.1f},0,0,1" for t in rest] + [f"{t + 65:.1f},0,0,1" for t in rest]
+    np.testing.assert_allclose(flown(tmp_path, rows)[:, :3], [[0.0, 0.0, 1.0]] * 500, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ((*SQUARE, "20,0,0,1"), "line 7 column p[xy]: 12 s after line 6, and the smooth curve sw"),
+        (("0,0,0,1", "10,0,0,1", "10.1,.05,0,1", "10.2,.2,0,1", "10.3,.45,0,1"), "line 3 column"),
+    ],
+)
+def test_rows_between_which_the_curve_swings_out_are_refused(tmp_path, rows, reason):
+    with pytest.raises(ScenarioError, match=reason) as error:
+        flown(tmp_path, rows)
+    assert "give rows between them" in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("per_turn", [3, 4, 6])
+def test_few_rows_of_a_circle_and_of_a_swing_are_flown(tmp_path, per_turn):
+    turn = 2.0 * np.pi / per_turn * np.arange(4 * per_turn)
+    times = 6.0 / per_turn * np.arange(4 * per_turn)
+    round_about = np.column_stack([times, np.cos(turn), np.sin(turn), 0.0 * turn + 1.5])
+    to_and_fro = np.column_stack([times, 2.0 * np.cos(turn + 0.5), 0.0 * turn, 0.0 * turn + 1.5])
+    assert np.abs(flown(tmp_path, text(round_about))[:, :2]).max() < 1.05
+    assert np.abs(flown(tmp_path, text(to_and_fro))[:, 0]).max() < 2.3
+    assert len(flown(tmp_path, SQUARE))
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**31), count=st.integers(1, 12))
+def test_the_band_is_solved_as_by_singular_values(seed, count):
+    random = np.random.default_rng(seed)
+    n, width = count + 7, 8
+    first = np.sort(np.concatenate([np.arange(count), random.integers(0, count, 3 * n)]))
+    band, target = random.normal(size=(len(first), width)), random.normal(size=(len(first), 2))
+    whole = np.zeros((len(first), n))
+    for row, j, part in zip(whole, first, band, strict=True):
+        row[j : j + width] = part
+    expected = np.linalg.lstsq(whole, target)[0]
+    np.testing.assert_allclose(_band_solved(first, band, target, n), expected, atol=1e-6)

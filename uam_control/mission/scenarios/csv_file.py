@@ -24,6 +24,7 @@ import numpy as np
 from uam_control.coordinates import YAW, Z, arm_coordinates
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
+from uam_control.mission.scenarios.open_gaps import worst_swing
 from uam_control.mission.scenarios.route import Route, with_ramps
 from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
@@ -194,24 +195,45 @@ def _path(
         _check_angles(table, angles, vehicle, names)
     else:
         angles = np.tile(vehicle.stowed, (len(times), 1))
-    columns = ("px", "yaw" if table.columns("quaternion") is None else "qw", names[0])
+    heading = "yaw" if table.columns("quaternion") is None else "qw"
+    columns = (GROUPS["position"], (heading,), names)
     groups = (
         CurveSamples(position, velocity, acceleration),
         CurveSamples(yaw, turning),
         CurveSamples(angles),
     )
     try:
-        base, heading, arm = fitted(times, groups, PASSES_WITHIN)
+        curves = fitted(times, groups, PASSES_WITHIN)
     except Misfit as error:
         raise table.error(
             error.row,
-            columns[error.group],
+            columns[error.group][0],
             f"no smooth curve passes within {PASSES_WITHIN:g}; it is {error.distance:.3g} off here",
         ) from None
+    for named, samples, curve in zip(columns, groups, curves, strict=True):
+        _check_gaps(table, named, samples, curve)
+    base, heading, arm = curves
     powers = base.coefficients
     none = np.zeros((*powers.shape[:2], YAW - Z - 1))  # roll and pitch
     together = (powers, none, heading.coefficients, arm.coefficients)
     return Polynomials(base.knots, np.concatenate(together, axis=2))
+
+
+def _check_gaps(
+    table: _Table, names: tuple[str, ...], samples: CurveSamples, curve: Polynomials
+) -> None:
+    """Raise ScenarioError where rows are so far apart that the curve swings out between them."""
+    swing = worst_swing(table.times - table.times[0], samples, curve)
+    if swing is None:
+        return
+    unit = "m" if names == GROUPS["position"] else "rad"
+    apart = table.times[swing.row + 1] - table.times[swing.row]
+    raise table.error(
+        swing.row + 1,
+        names[swing.column],
+        f"{apart:.3g} s after line {swing.row + 2}, and the smooth curve swings out of the two "
+        f"rows by {swing.distance:.2g} {unit}; give rows between them",
+    )
 
 
 def _yaw(table: _Table) -> np.ndarray:
