@@ -145,6 +145,26 @@ def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, message):
     assert message in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("arm", "message"),
+    [
+        ({"links": [0.14, 0.1]}, "arm.links: [0.14, 0.1] m, s500_arm.xml has [0.1, 0.14] m"),
+        ({"links": [0.1, 0.1415]}, "arm.links: [0.1, 0.1415] m, s500_arm.xml has"),
+        ({"mount": [0.0, 0.0, 0.073]}, "arm.mount: [0.0, 0.0, 0.073] m, s500_arm.xml has [0, 0, -"),
+        ({"magnet": 0.05}, "arm.magnet: [0.05] m, s500_arm.xml has [0.03] m with all joints at 0"),
+        ({"links": [0.1, 0.1405]}, ""),  # rounded
+    ],
+)
+def test_an_arm_of_other_lengths_than_the_mjcf_is_refused(arm, message):
+    vehicle = Vehicle.of(describe(changed((("arm",), S500.numbers["arm"] | arm)), S500.file))
+    if not message:
+        vehicle.compile(0.0)
+        return
+    with pytest.raises(VehicleError) as error:
+        vehicle.compile(0.0)
+    assert message in str(error.value) and "\n" not in str(error.value)
+
+
 @pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
 def test_the_arm_reaches_as_far_as_in_the_mjcf(name):
     vehicle = Vehicle.load(name)

@@ -6,6 +6,7 @@ from uam_control.vehicle.description import (
     GRAVITY,
     POSITION_SERVO,
     SERVO_MODES,
+    Arm,
     Joint,
     Rotor,
     RotorModel,

@@ -21,7 +21,7 @@ from uam_control.vehicle import (
     VehicleDescription,
     load_description,
 )
-from uam_lab.flight import node_options
+from uam_lab.flight import arm_on_ground, node_options
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes.node_environment import without_discovery
 from uam_msgs_py.node import process_options
@@ -286,6 +286,7 @@ def settings(
         )
     else:
         feasible.check(loaded)
+    arm_on_ground.check(described, loaded)
     injected = read_schedule(faults, loaded, seed)
     acting = presets.read(
         [plant_preset] if isinstance(plant_preset, str) else plant_preset, effects

@@ -1,0 +1,49 @@
+"""Whether the vehicle can stand as a flight begins and ends: its arm above its feet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from uam_control.coordinates import ARM, CHI
+from uam_control.mission import Scenario, ScenarioError
+from uam_control.mission.motion.trajectory import reference_rows
+from uam_control.mission.scenarios.scenario import standing
+from uam_control.vehicle import VehicleDescription, VehicleError
+from uam_sim_bridge.plant.arm_geometry import room_below
+from uam_sim_bridge.plant.vehicle import Vehicle
+
+SINKS = 0.005  # [m] by which an arm may reach below the feet: a gear and a floor give way
+
+
+def check(vehicle: VehicleDescription, scenario: Scenario) -> None:
+    """Raise VehicleError or ScenarioError if the arm reaches through the ground.
+
+    Checked are the stowed arm, that of the take-off and that of the landing. An MJCF that does not
+    compile is not judged here: the plant names what is wrong with it.
+    """
+    try:
+        model = Vehicle.of(vehicle).compile(0.0)
+    except VehicleError:
+        return
+    start = standing(scenario.arm_start)
+    flown = scenario.begun_at(start)
+    end = flown.landing.at + flown.landing.duration
+    last = reference_rows(flown.trajectory(start), np.array([end]), len(vehicle.joints))
+    told = ScenarioError, f"scenario {scenario.name}:"
+    for (error, where), what, angles in (
+        ((VehicleError, f"{vehicle.file}: joints:"), "stowed", vehicle.stowed),
+        (told, "arm_start", scenario.arm_start),
+        (told, "landing", last[CHI, 0, ARM]),
+    ):
+        room = room_below(model, vehicle.joint_names, angles)
+        if room is not None and room < -SINKS:
+            raise error(
+                f"{where} {what}: with joints at {_degrees(angles)} deg the arm reaches "
+                f"{-room:.3f} m below the feet; it must stay above them on the ground"
+            )
+
+
+def _degrees(angles: Sequence[float]) -> str:
+    return ", ".join(f"{angle:.0f}" for angle in np.degrees(angles) + 0.0)

@@ -1,0 +1,107 @@
+"""Where the arm of the plant's model is: its joints at zero, and its lowest point on the ground.
+
+Read from the compiled model, so that any form of MJCF counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from uam_control.vehicle import Arm
+
+BASE, FACE = "base", "magnet_face"  # body and site of the MJCF
+SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
+NO_LENGTH = 1e-9  # [m]
+
+
+def measured_arm(model: mujoco.MjModel, joints: Sequence[str]) -> Arm:
+    """Return the arm as it is in the model, with all joints at zero."""
+    data = _posed(model, joints, [0.0] * len(joints))
+    places = [data.joint(name).xanchor for name in (*joints, SWING)]
+    places.append(data.site(FACE).xpos)
+    lengths = [float(upper[2] - lower[2]) for upper, lower in zip(places, places[1:], strict=False)]
+    return Arm(tuple(map(float, places[0])), tuple(lengths[:-1]), lengths[-1])
+
+
+def room_below(
+    model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]
+) -> float | None:
+    """Return how far the arm's lowest point is above that of the gear [m]; None without a gear.
+
+    angles (n,) [rad]; the base is level, the magnet hangs.
+    """
+    data = _posed(model, joints, angles)
+    _hang(model, data)
+    base, first = model.body(BASE).id, model.joint(joints[0]).bodyid[0]
+    gear, arm = [], [float(data.site(FACE).xpos[2])]
+    for geom in np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0)):
+        body = model.geom_bodyid[geom]
+        if not _meets_the_world(model, geom):
+            continue
+        if model.body_weldid[body] == model.body_weldid[base]:
+            gear.append(_lowest(model, data, geom))
+        elif _is_part(model, body, first):
+            arm.append(_lowest(model, data, geom))
+    return min(arm) - min(gear) if gear else None
+
+
+def _posed(model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]) -> mujoco.MjData:
+    """Return the data of a level base at the origin, with joint angles (n,) [rad]."""
+    data = mujoco.MjData(model)
+    base = model.joint(BASE).qposadr[0]
+    data.qpos[base : base + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    data.joint(SWING).qpos = 0.0
+    for name, angle in zip(joints, angles, strict=True):
+        data.joint(name).qpos = angle
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def _hang(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Turn the magnet's pivot so that its face is as low as possible."""
+    pivot = data.joint(SWING)
+    way, axis = data.site(FACE).xpos - pivot.xanchor, pivot.xaxis
+    along, across = way[2] - (way @ axis) * axis[2], np.cross(axis, way)[2]
+    if math.hypot(along, across) < NO_LENGTH:
+        return
+    angle = math.remainder(math.atan2(across, along) + math.pi, math.tau)
+    joint = model.joint(SWING)
+    pivot.qpos = np.clip(angle, *joint.range) if joint.limited[0] else angle
+    mujoco.mj_kinematics(model, data)
+
+
+def _is_part(model: mujoco.MjModel, body: int, of: int) -> bool:
+    while body > of:
+        body = model.body_parentid[body]
+    return body == of
+
+
+def _meets_the_world(model: mujoco.MjModel, geom: int) -> bool:
+    world = model.geom_bodyid == 0
+    bits = model.geom_contype[world] & model.geom_conaffinity[geom]
+    return bool(np.any(bits | (model.geom_conaffinity[world] & model.geom_contype[geom])))
+
+
+def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Return the height [m] of a shape's lowest point; of its box, where the shape is unusual."""
+    up = data.geom_xmat[geom].reshape(3, 3)[2]
+    centre, size, kind = data.geom_xpos[geom][2], model.geom_size[geom], model.geom_type[geom]
+    shapes = mujoco.mjtGeom
+    if kind == shapes.mjGEOM_SPHERE:
+        return float(centre - size[0])
+    if kind == shapes.mjGEOM_CAPSULE:
+        return float(centre - abs(up[2]) * size[1] - size[0])
+    if kind == shapes.mjGEOM_CYLINDER:
+        return float(centre - abs(up[2]) * size[1] - math.hypot(up[0], up[1]) * size[0])
+    if kind == shapes.mjGEOM_ELLIPSOID:
+        return float(centre - np.linalg.norm(up * size))
+    if kind == shapes.mjGEOM_MESH:
+        mesh = model.mesh(model.geom_dataid[geom])
+        points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
+        return float(centre + (points @ up).min())
+    box = model.geom_aabb[geom]
+    return float(centre + up @ box[:3] - np.abs(up) @ box[3:])
