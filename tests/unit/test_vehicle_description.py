@@ -14,10 +14,10 @@ from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, derived_parameters, load_description
-from uam_control.vehicle.loading import describe
+from uam_control.vehicle.loading import HOVERS, describe
 from uam_lab.analysis import dynamics, supply
 from uam_lab.results.timeseries import Series, columns_of
-from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.autopilot.params import DEFINITIONS, Parameters
 from uam_sim_bridge.faults import FaultError, feasibility, read_schedule
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
@@ -81,7 +81,12 @@ def test_what_the_model_is_made_of():
         ((("model",), "none.xml"), "none.xml does not exist"),
         ((("mass",), -1.0), "s500_arm.yaml: mass: -1 is not above 0"),
         ((("mass",), "heavy"), "mass: a number expected, got 'heavy'"),
-        ((("mass",), 5.0), "a weight of 49.1 N is not below the full thrust of the rotors, 41.4 N"),
+        (
+            (("mass",), 5.0),
+            "a weight of 49.1 N, needs 119 % of the full thrust of the rotors, 41.4",
+        ),
+        ((("mass",), 3.5), "needs 83 % of the full thrust of the rotors, 41.4 N; 10 to 80 % are"),
+        ((("rotors", "speed_max"), 2600.0), "needs 9.34 % of the full thrust of the rotors, 231.2"),
         ((("gravity",), math.inf), "gravity: inf is not finite"),
         ((("rotors", "curve_factor"), 1.5), "rotors.curve_factor: 1.5 is outside 0..1"),
         ((("rotors", "efficiency"), [1.0]), "rotors.efficiency: a list of 4 numbers expected"),
@@ -93,7 +98,8 @@ def test_what_the_model_is_made_of():
         ((("joints", 1, "stowed_deg"), 150), "joints[1].stowed_deg: 150 is outside the joint"),
         ((("servos", "effort_limit"), 4.0), "4 N m is above stall_torque, 3 N m"),
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),
-        ((("control_period",), 0.02), "control_period: 0.02 s is above 0.01 s"),
+        ((("control_period",), 0.02), "control_period: 0.02 s is above 0.008 s"),
+        ((("control_period",), 0.01), "control_period: 0.01 s is above 0.008 s"),
         ((("air", "drag"), [0.1]), "air.drag: a list of 3 numbers expected"),
         ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 is not above 0"),
         (
@@ -107,6 +113,19 @@ def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):
     with pytest.raises(VehicleError) as error:
         describe(changed(change), S500.file)
     assert message in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [(("control_period",), 0.008), (("mass",), 3.39), (("rotors", "speed_max"), 2500.0)],
+)
+def test_what_just_flies_is_read(change):
+    assert Parameters.of(describe(changed(change), S500.file))["MPC_THR_HOVER"] <= 0.8
+
+
+def test_the_hover_of_every_vehicle_is_in_the_range_of_the_autopilot():
+    hover = DEFINITIONS["MPC_THR_HOVER"]
+    assert (hover.low, hover.high) == HOVERS
 
 
 @pytest.mark.parametrize(
@@ -249,11 +268,11 @@ def test_faults_count_the_parts_of_the_vehicle(name, fault, message):
 
 
 def test_the_estimator_and_the_identification_take_the_gravity_of_the_vehicle():
-    moon = describe(changed((("gravity",), 1.62)), S500.file)
-    profile = default_profile("modular", moon)
-    assert profile.sets["state_estimator"].gravity == 1.62
-    assert profile.sets["position_controller"].gravity == 1.62
-    assert RateThrustMap(vehicle=moon).gravity == 1.62
+    mars = describe(changed((("gravity",), 3.71)), S500.file)
+    profile = default_profile("modular", mars)
+    assert profile.sets["state_estimator"].gravity == 3.71
+    assert profile.sets["position_controller"].gravity == 3.71
+    assert RateThrustMap(vehicle=mars).gravity == 3.71
 
 
 def test_the_wrench_of_six_rotors():

@@ -22,7 +22,8 @@ from uam_control.vehicle.plant_numbers import check_plant_numbers
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
-LONGEST_PERIOD = 0.01  # [s] of a tick: the attitude loop oscillates with longer ones
+LONGEST_PERIOD = 0.008  # [s] of a tick: the attitude loop oscillates in yaw with 10 ms
+HOVERS = 0.1, 0.8  # share of the full thrust in hover: the range of the autopilot, MPC_THR_HOVER
 LEAST_RANGE = 0.1  # [rad] to either side of 0, because the supervisor's limits are symmetric
 
 
@@ -67,6 +68,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     )
     _check_names(described)
     _check_rotors(described, rotor)
+    _check_hover(described)
     _check_servo(described.servo, servo)
     check_plant_numbers(top)
     return described
@@ -143,12 +145,16 @@ def _check_rotors(described: VehicleDescription, rotor: Section) -> None:
     if not 4 <= count <= 12:
         raise VehicleError(f"{rotor.where}.layout: {count} rotors; 4 to 12 are possible")
     rotor.numbers("efficiency", count)
-    full = count * described.rotor.thrust_max
-    weight = described.mass * described.gravity
-    if weight >= full:
+
+
+def _check_hover(described: VehicleDescription) -> None:
+    low, high = HOVERS
+    if not low <= described.hover_command <= high:
+        weight, full = described.mass * described.gravity, described.full_thrust
         raise VehicleError(
-            f"{described.file}: mass: a weight of {weight:.1f} N is not below the full thrust of "
-            f"the rotors, {full:.1f} N"
+            f"{described.file}: mass: to hover, a weight of {weight:.1f} N, needs "
+            f"{100 * weight / full:.3g} % of the full thrust of the rotors, {full:.1f} N; "
+            f"{100 * low:g} to {100 * high:g} % are possible"
         )
 
 
