@@ -12,6 +12,7 @@ from typing import Any
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import Profile, default_profile, load_profile
+from uam_control.profiles.profile_fit import misfits
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters
@@ -312,7 +313,7 @@ def settings(
         plant=plant,
         scenario_source=str(scenario),
         scenario_options=options,
-        notes=loaded.notes + slower,
+        notes=loaded.notes + slower + misfits(flown) + _unsteered(described, loaded, mass),
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=presets.added(vehicle_changes or {}, acting),
         without=left_out,
@@ -332,6 +333,13 @@ def settings(
     )
     check_feasible(made, injected)
     return made
+
+
+def _unsteered(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:
+    """Return a note if the flight picks a payload with an arm of unknown lengths."""
+    if vehicle.arm is not None or not scenario.magnet or not mass:
+        return ()
+    return (f"{vehicle.file.name} has no section arm: the magnet is not steered to the payload",)
 
 
 def _scenario_options(**given: Any) -> ScenarioOptions:

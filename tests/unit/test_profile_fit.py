@@ -1,0 +1,52 @@
+"""Notes on a profile that is probably another vehicle's."""
+
+from dataclasses import replace
+
+import pytest
+
+from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.profiles.profile_fit import misfits
+from uam_control.vehicle import load_description
+from uam_lab.flight import flight_settings
+from uam_lab.flight.flight_settings import settings
+
+S500 = load_description()
+
+
+@pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
+def test_the_vehicles_here_have_profiles_that_fit(name):
+    assert not misfits(default_profile("modular", load_description(name)))
+
+
+@pytest.mark.parametrize(
+    ("mass", "full", "expected"),
+    [
+        (1.7, 41.4, ""),  # 2.2 kg is 29 % more
+        (3.1, 41.4, ""),  # and 29 % less
+        (0.5, 41.4, "inertia 2.2 kg along x, the vehicle has 0.5 kg"),
+        (6.0, 120.0, "inertia 2.2 kg along x, the vehicle has 6 kg"),
+        (2.2, 28.0, "thrust_max 36 N, the rotors' full thrust is 28 N"),
+    ],
+)
+def test_a_profile_of_another_vehicle_is_named(mass, full, expected):
+    rotor = replace(
+        S500.rotor, thrust_coefficient=full / len(S500.rotors) / S500.rotor.speed_max**2
+    )
+    vehicle = replace(S500, mass=mass, rotor=rotor)
+    text = "; ".join(misfits(load_profile("s500", vehicle=vehicle)))
+    whole = f"profile s500 does not fit s500_arm: position_controller has {expected}"
+    assert text == (whole if expected else "")
+
+
+def test_the_flights_notes_have_it():
+    made = settings("hover", engine="direct", profile="hexa")
+    (note,) = made.notes
+    assert "thrust_max 52 N, the rotors' full thrust is 41.4 N" in note
+
+
+def test_a_flight_with_payload_says_that_the_arms_lengths_are_unknown(monkeypatch):
+    monkeypatch.setattr(flight_settings, "load_description", lambda name: replace(S500, arm=None))
+    note = "s500_arm.yaml has no section arm: the magnet is not steered to the payload"
+    assert settings("quick_pick", engine="direct").notes == (note,)
+    assert not settings("hover", engine="direct").notes
+    assert not settings("quick_pick", engine="direct", payload_mass=0.0).notes
