@@ -247,18 +247,24 @@ def flights(folder: Path | None = None) -> list[RunningFlight]:
 
 
 def flight_of(
-    instance: int | None, namespace: str = "", folder: Path | None = None
+    instance: int | None,
+    namespace: str = "",
+    folder: Path | None = None,
+    domain: int | None = None,
 ) -> RunningFlight | None:
     """Return the flight `instance`, else that in `namespace`, else the only one that runs.
 
-    namespace: in the form of ROS, "" for any. Returns None without a running flight: the
-    environment's domain applies. Raises PortError if several flights are possible.
+    namespace: in the form of ROS, "" for any; domain: that of the flight, if the user has set
+    ROS_DOMAIN_ID. Returns None without such a flight: the environment's domain applies. Raises
+    PortError if several flights are possible.
     """
     running = flights(folder)
     if instance is not None:
         missing = RunningFlight(instance, ports_of(instance).domain, namespace or "/")
         return next((one for one in running if one.instance == instance), missing)
-    possible = [one for one in running if namespace in ("", one.namespace)]
+    possible = [
+        one for one in running if namespace in ("", one.namespace) and domain in (None, one.domain)
+    ]
     if len(possible) > 1:
         numbers = ", ".join(f"{one.instance}: {one.namespace}" for one in possible)
         raise PortError(

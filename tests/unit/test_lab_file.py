@@ -13,9 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.settings import configuration
+from uam_lab.results.result_folder import ResultFolder
 from uam_lab.vehicle.lab import LabError, Room
 from uam_lab.vehicle.lab_file import REQUIRED, load_lab, template
 from uam_lab.vehicle.lab_settings import settings_of
+from uam_lab.vehicle.vehicle_nodes import parameters
 from uam_sim_bridge.drivers.dynamixel.chain import ArmError
 from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
 from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
@@ -86,6 +88,13 @@ def test_a_ground_station_is_connected_through_the_bridge(tmp_path):
     assert settings_of(load_lab(written(tmp_path))).gcs == ""
 
 
+def test_the_bridge_speaks_to_the_system_of_the_lab_file(tmp_path):
+    for changes, system in (({}, 1), ({"autopilot_system": 7}, 7)):
+        lab = load_lab(written(tmp_path, **changes))
+        found = parameters(lab, settings_of(lab), ResultFolder(tmp_path / "out"))
+        assert found["mavlink_bridge"]["autopilot_system"] == system
+
+
 def test_the_layout_is_that_of_the_file(tmp_path):
     lab = load_lab(
         written(tmp_path, layout="fused", nodes={"flight_controller": {"inner_rate": 50.0}})
@@ -141,6 +150,8 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"magnet": {"through": "autopilot"}}, "magnet.magnet: actuator or gripper expected"),
         ({"magnet__line": 2.5}, "magnet: line: 2.5 is no integer; allowed: 0 to 1023"),
         ({"cockpit__port": 99999}, "cockpit.port: 99999 is not a whole number from 0 to 65535"),
+        ({"autopilot_system": 0}, "autopilot_system: a whole number from 1 to 250 expected, as"),
+        ({"autopilot_system": "two"}, "as MAV_SYS_ID of PX4, got 'two'"),
         ({"cockpit__host": "x"}, "cockpit.host: unknown; allowed: address, port"),
         ({"nodes": {"mujoco_sim": {"seed": 3}}}, "nodes.mujoco_sim: unknown; allowed: position_"),
         ({"nodes": {"mission": {"geofence_low": [0, 0, 0]}}}, "follows from the section room"),

@@ -129,6 +129,17 @@ def test_set_up(rig):
     assert link.lost == link.bad_bytes == 0 and link.statistics.rate > 30.0
 
 
+def test_an_autopilot_of_another_system_is_named(rig):
+    rig.codec = Codec(2, 1)
+    rig.run(3.0)
+    assert rig.link.foreign == {2} and not rig.link.alive and rig.link.ignored > 10
+    (line,) = [one for one in rig.link.warnings if "heartbeat" in one]
+    assert line.startswith("no heartbeat of system 1, but of system 2: set autopilot_system")
+    rig.codec = Codec(1, 1)
+    rig.run(3.0)
+    assert rig.link.alive and not [one for one in rig.link.warnings if "heartbeat" in one]
+
+
 def test_time_is_compared_both_ways(rig):
     rig.run(3.0)
     sync = rig.link.time_sync

@@ -79,6 +79,11 @@ def test_a_flight_is_found_by_instance_and_by_namespace(tmp_path):
         with pytest.raises(PortError, match=f"choose one by .*{number}: /uav2"):
             ports.flight_of(None, folder=tmp_path)
         assert ports.flight_of(None, "/uav3", folder=tmp_path) is None
+        # a domain that the user has set is not that of another flight
+        assert ports.flight_of(None, "/uav2", folder=tmp_path, domain=7) == expected
+        assert ports.flight_of(None, "/uav2", folder=tmp_path, domain=77) is None
+        assert ports.flight_of(None, folder=tmp_path, domain=77) is None
+        assert ports.flight_of(number, folder=tmp_path, domain=77) == expected
     assert ports.flight_of(None, folder=tmp_path) is None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.presets import CALM, Effects
 from uam_sim_bridge.plant.engines import PlantError
-from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
+from uam_sim_bridge.ports import INSTANCES, PortError, flight_of, flights
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
 WRONG_USE = 2  # exit status
@@ -189,17 +190,28 @@ class Command:
 def chosen_flight(options: argparse.Namespace) -> tuple[int | None, str]:
     """Return ROS domain and namespace of the flight that --instance and --namespace choose.
 
-    The domain is None without a running flight: that of the environment. Raises SettingsError,
-    PortError.
+    Without --instance the flight must be in the domain ROS_DOMAIN_ID, if the user has set it: the
+    nodes there may be those of another vehicle. The domain is None without a running flight: that
+    of the environment. Raises SettingsError, PortError.
     """
     try:
         namespace = normal(options.namespace) if options.namespace else ""
     except ValueError as error:
         raise SettingsError(str(error)) from None
-    flight = flight_of(options.instance, namespace)
+    given = os.environ.get("ROS_DOMAIN_ID", "")
+    domain = int(given) if given.isdecimal() else None
+    flight = flight_of(options.instance, namespace, domain=domain)
     if flight is None:
         return None, namespace or "/"
     return flight.domain, namespace or flight.namespace
+
+
+def others_running() -> str:
+    """Return the flights of this computer, behind "; ", for a command that has found none."""
+    found = [
+        f"--instance {one.instance}: domain {one.domain}, {one.namespace}" for one in flights()
+    ]
+    return f" (running: {'; '.join(found)})" if found else ""
 
 
 def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Profile:

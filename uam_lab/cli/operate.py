@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from uam_lab.cli.command import Command, chosen_flight, number
+from uam_lab.cli.command import Command, chosen_flight, number, others_running
 from uam_lab.flight.flight_settings import SettingsError, require_ros
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.N
         try:
             return act(Operator(guest.node), options)
         except NoFlight as error:
-            raise SettingsError(str(error)) from None
+            raise SettingsError(f"{error}{others_running()}") from None
 
 
 def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:
@@ -111,7 +111,11 @@ def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:
 
 def _kill(operator: Operator, options: argparse.Namespace) -> int:
     if not options.yes:
-        print("The motors stop at once; a vehicle in the air falls. Type kill to confirm: ", end="")
+        print(
+            f"{operator.place}: the motors stop at once; a vehicle in the air falls. "
+            "Type kill to confirm: ",
+            end="",
+        )
         sys.stdout.flush()
         typed = sys.stdin.readline()
         if not typed.endswith("\n"):  # the end of a file or pipe
@@ -152,6 +156,10 @@ def _status(operator: Operator, _: argparse.Namespace) -> int:
 
 
 def _preflight(operator: Operator, _: argparse.Namespace) -> int:
+    mission = operator.mission()
+    if mission.time >= 0.0 and not mission.done:  # the newest report is that before the take-off
+        since = f"{mission.state}, {mission.time:.1f} s since the take-off"
+        return _said("preflight", False, f"{since}: there is no report in flight")
     checks = operator.preflight()
     width = max((len(check.name) for check in checks), default=0)
     for check in checks:

@@ -19,6 +19,7 @@ from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installat
 PATIENCE = 5.0  # [s] for a heartbeat (sent once per second)
 VERSION_PATIENCE = 2.0  # [s] for AUTOPILOT_VERSION after it
 BEAT, POLL = 0.5, 0.01  # [s]
+USUAL_SYSTEM = 1  # that the bridge speaks to, without autopilot_system
 OWN_SYSTEM = 254  # system id: unused, a ground station has 255, autopilots count from 1
 RELEASES = ((255, ""), (192, " rc"), (128, " beta"), (64, " alpha"), (0, " dev"))
 
@@ -135,6 +136,9 @@ def describe(url: str, heard: Heard) -> Finding:
         return warn("autopilot", found, "the bridge uses PX4's modes and parameters: docs/px4.md")
     if armed == "armed":
         return warn("autopilot", f"{found}: ARMED", "mind the propellers; disarm before a flight")
+    if heard.system != USUAL_SYSTEM:
+        advice = f"lab file: autopilot_system: {heard.system}; or set its MAV_SYS_ID to 1"
+        return warn("autopilot", found, advice)
     return ok("autopilot", found)
 
 

@@ -43,6 +43,12 @@ class Operator:
                 topic.type, topic.name, lambda m, name=topic.name: self._take(name, m), topic.qos
             )
 
+    @property
+    def place(self) -> str:
+        """Return ROS domain and namespace of the flight, for the user."""
+        domain, namespace = self._node.context.get_domain_id(), self._node.get_namespace()
+        return f"ROS domain {domain}, namespace {namespace}"
+
     def command(self, name: str) -> tuple[bool, str]:
         """Call a Trigger service of the mission; return whether it was accepted, and the answer.
 

@@ -45,6 +45,7 @@ def emulated(lab: Lab, devices: Path, mocap_port: int) -> dict[str, Any]:
         "scenario": lab.scenario,
         "arm": {**arm, "device": str(devices / BUS_DEVICE)},
         "autopilot": f"serial:{devices / SERIAL_NEAR}:{baud_of(lab)}",
+        "autopilot_system": 1,
     }
     if not lab.profile:
         del document["profile"]

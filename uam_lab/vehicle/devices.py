@@ -143,4 +143,7 @@ def _autopilot(lab: Lab, reports: Reports) -> tuple[bool, str]:
         return True, text if report.level == STALE else f"{text}; {report.message}"
     if report.values.get("link open") == "False":
         return False, f"{lab.autopilot}: cannot be opened; is it plugged in?"
-    return False, f"{lab.autopilot}: no heartbeat"
+    text = f"{lab.autopilot}: no heartbeat"
+    if other := report.values.get("other autopilots"):
+        text += f" of system {lab.autopilot_system}, but of {other}: see autopilot_system"
+    return False, text

@@ -58,7 +58,8 @@ class Lab:
     link; imu: one of IMUS; mocap: None where another driver publishes the poses; arm: its servos,
     arm_file: the file with them; nodes: node → parameter → value, beside those of the sections;
     out: folder of the result folders; process: parameters of `ProcessParameters` of the nodes that
-    fly; fused: the control nodes are one process; gcs: URL of a ground station behind the bridge.
+    fly; fused: the control nodes are one process; gcs: URL of a ground station behind the bridge;
+    autopilot_system: MAVLink system id, PX4's MAV_SYS_ID.
     """
 
     file: Path
@@ -78,3 +79,4 @@ class Lab:
     process: dict[str, Any] = field(default_factory=dict)
     fused: bool = False
     gcs: str = ""
+    autopilot_system: int = 1

@@ -46,8 +46,9 @@ from uam_sim_bridge.ports import PortError
 
 FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
-OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout", "gcs")
+OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout", "gcs", "autopilot_system")
 SEPARATE, FUSED = LAYOUTS = ("separate", "fused")
+LAST_SYSTEM = 250  # of PX4's MAV_SYS_ID
 GEOFENCE = ("geofence_low", "geofence_high")
 ARM_DRIVER = "arm_driver"
 # in `nodes`
@@ -82,6 +83,7 @@ def load_lab(name_or_file: str | Path) -> Lab:
         scenario=_near(top, top.text("scenario")),
         autopilot=_autopilot(top),
         gcs=_gcs(top),
+        autopilot_system=_system(top),
         imu=_one_of(top, "imu", IMUS),
         room=_room(top),
         mocap=mocap,
@@ -160,6 +162,14 @@ def _gcs(top: Section) -> str:
     if ":" not in url or _tried(top, "gcs", lambda: parse_url(url)).kind != "udp":
         raise top.error("gcs", f"'{url}' is no link to a ground station: udp:HOST:PORT expected")
     return url
+
+
+def _system(top: Section) -> int:
+    value = top.values.get("autopilot_system", 1)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= LAST_SYSTEM:
+        what = f"a whole number from 1 to {LAST_SYSTEM} expected, as MAV_SYS_ID of PX4"
+        raise top.error("autopilot_system", f"{what}, got {value!r}")
+    return value
 
 
 def _room(top: Section) -> Room:

@@ -50,7 +50,11 @@ def parameters(
     sections = node_arguments.flight_nodes(settings, folder)
     sections[wiring.RECORDER] |= {"simulated": False}
     sections[wiring.MISSION] |= {"state_timeout": STATE_TIMEOUT}
-    sections[wiring.BRIDGE] |= WAITS | {"autopilot": lab.autopilot, "imu_clock": "system"}
+    sections[wiring.BRIDGE] |= WAITS | {
+        "autopilot": lab.autopilot,
+        "autopilot_system": lab.autopilot_system,
+        "imu_clock": "system",
+    }
     if lab.magnet.through == AUTOPILOT:
         sections[wiring.BRIDGE] |= lab.magnet.output.to_mapping() | _switching(lab)
     host = lab.cockpit.address

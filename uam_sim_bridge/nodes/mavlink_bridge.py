@@ -338,6 +338,7 @@ class MavlinkBridgeNode(UamNode):
             "armed": link.armed,
             "landed": link.landed,
             "messages of other systems": link.ignored,
+            "other autopilots": ", ".join(map(str, sorted(link.foreign))),
             "refused": link.refused,
             "heartbeat": link.alive,
             "link open": link.open,

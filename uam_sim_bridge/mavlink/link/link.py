@@ -58,6 +58,7 @@ class OffboardLink(FlightState):
     (the kill switch is engaged): latest report; `values`: its parameters (of WATCHED, and required
     ones) by name; `parameters`: their comparison; `ignored`: number of messages from other systems
     or for other receivers; `vitals`: battery, estimator and sensors; `reboots`: number of restarts;
+    `foreign`: system ids of other autopilots whose heartbeats have come;
     `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
     """
 
@@ -80,6 +81,7 @@ class OffboardLink(FlightState):
         self.sequence = sequence
         self.landed = self.failsafe = self.killed = False
         self.ignored = self.reboots = 0
+        self.foreign: set[int] = set()
         self.vitals = Vitals()
         self.time_sync = TimeSync()
         self.imu = AutopilotImu(self.time_sync) if imu_rate else None
@@ -108,7 +110,16 @@ class OffboardLink(FlightState):
     def warnings(self) -> tuple[str, ...]:
         """Return one line per problem with the autopilot's parameters and streams."""
         unsigned = (UNSIGNED,) if self._unsigned else ()
-        return unsigned + self.parameters.warnings + self.streams.warnings
+        foreign = (self._foreign,) if self.foreign and not self._was_connected else ()
+        return unsigned + foreign + self.parameters.warnings + self.streams.warnings
+
+    @property
+    def _foreign(self) -> str:
+        there = ", ".join(map(str, sorted(self.foreign)))
+        return (
+            f"no heartbeat of system {self._target}, but of system {there}: set autopilot_system, "
+            "or the autopilot's MAV_SYS_ID"
+        )
 
     @property
     def _unsigned(self) -> bool:
@@ -165,6 +176,7 @@ class OffboardLink(FlightState):
             for message in self._framer.take(data, self._transport.stream):
                 if message.get_srcSystem() != self._target or not self._for_us(message):
                     self.ignored += 1
+                    self._note_foreign(message)
                 else:
                     self.statistics.count(message.get_srcComponent(), message.get_seq())
                     self.streams.count(message.get_msgId())
@@ -237,6 +249,10 @@ class OffboardLink(FlightState):
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()
+
+    def _note_foreign(self, m: Message) -> None:
+        if m.get_type() == "HEARTBEAT" and m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
+            self.foreign.add(m.get_srcSystem())
 
     def _for_us(self, m: Message) -> bool:
         """Return whether the message is a broadcast or addressed to this companion computer."""
