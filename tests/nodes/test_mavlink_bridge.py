@@ -60,13 +60,15 @@ def test_the_autopilots_imu_is_published_before_and_with_the_ticks(make_rig, pro
         clock.publish(writer.stamped(round(rig.body.time * 1e9) + 1000 * PERIOD))
         rig.autopilot_tick()
         rig.count += 1
-        return len(samples) > 20
+        if len(samples) <= 20:
+            return False
+        age = round(rig.body.time * 1e9) + 1000 * PERIOD - read_imu(samples[-1])[0]
+        # the clock of the test stands still between two ticks: TIMESYNC is right to some of them
+        return abs(age) <= 5 * PERIOD
 
-    probe.until(served, "samples before the first tick")
+    probe.until(served, "samples of now before the first tick")
     assert Serialized(Imu, samples[-1]).layout.frame == "base_link"
-    stamp, gyro, force = read_imu(samples[-1])
-    # the clock of the test stands still between two ticks: TIMESYNC is right to some of them
-    assert stamp == pytest.approx(round(rig.body.time * 1e9) + 1000 * PERIOD, abs=5 * PERIOD)
+    _, gyro, force = read_imu(samples[-1])
     np.testing.assert_allclose(gyro, rig.body.gyro, atol=1e-6)
     np.testing.assert_allclose(force, rig.body.accel, atol=1e-5)
     before = len(samples)
