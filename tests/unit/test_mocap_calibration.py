@@ -2,6 +2,7 @@
 
 import math
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from uam_control.maths.rotations import (
 )
 from uam_lab.cli.main import main
 from uam_sim_bridge.drivers.mocap import calibration as calibrations
-from uam_sim_bridge.drivers.mocap import raw_log
+from uam_sim_bridge.drivers.mocap import live, raw_log
 from uam_sim_bridge.drivers.mocap.fit import fit
 from uam_sim_bridge.drivers.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.drivers.mocap.measurement import angle_between, places, still
@@ -214,6 +215,11 @@ def test_the_command_guides_and_measures_over_real_sockets(tmp_path, capsys, mon
     monkeypatch.setattr("builtins.input", person)
     out, raw = tmp_path / "lab.yaml", tmp_path / "raw.csv"
     with MocapServer([body, TrackedBody("box")], lambda _: {"uam": at[0]}) as server:
+        # It measures for a second of the server's frames: a stalled test has all of them. Without
+        # frames the wall's clock ends it.
+        end = time.monotonic() + 60.0
+        clock = SimpleNamespace(monotonic=lambda: max(server.sent / RATE, time.monotonic() - end))
+        monkeypatch.setattr(live, "time", clock)
         given = ["--port", str(server.port), "--out", str(out), "--save", str(raw)]
         assert main(["calibrate-mocap", *given, "--duration", "1"]) == 0, capsys.readouterr().err
         assert main(["calibrate-mocap", *given, "--body", "drone"]) == 2

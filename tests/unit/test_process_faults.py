@@ -79,7 +79,7 @@ def threads(children, name):
     return [stat(one) for one in Path(f"/proc/{children.pid(name)}/task").iterdir()]
 
 
-def until(condition, seconds=5.0):
+def until(condition, seconds=20.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "did not happen in time"

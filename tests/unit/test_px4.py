@@ -336,7 +336,7 @@ def test_px4_starts_anew_when_the_simulator_hangs_up(build, tmp_path, once):
         first, _ = simulator.accept()
         _until(lambda: list(tmp_path.glob("uam-px4-*/log/today/1.ulg")))
         (px4,) = psutil.Process(process.pid).children()
-        time.sleep(1.5)  # the connection has been seen
+        time.sleep(1.5 if once else 4.0)  # the connection has been seen, by a stalled program too
         first.close()
         if once:
             simulator.settimeout(2.0)
