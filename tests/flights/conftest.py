@@ -21,6 +21,14 @@ def short_scenario(tmp_path_factory) -> Path:
     return file
 
 
+@pytest.fixture(scope="session")
+def long_scenario(tmp_path_factory) -> Path:
+    """As `short_scenario` with a minute of hovering: for a flight that the test cuts short."""
+    file = tmp_path_factory.mktemp("scenario") / "long.yaml"
+    file.write_text(SHORT.replace("from: 2,", "from: 62,").replace("at: 2,", "at: 62,"))
+    return file
+
+
 @pytest.fixture
 def fly(tmp_path):
     """fly(*options, report=False) starts a flight that ends with the test."""

@@ -144,15 +144,22 @@ def test_help_shows_examples(capsys):
 
 def test_an_interrupt_while_the_command_loads_is_one_line():
     command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--scenario", "hover"]
-    with subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as run:
-        process = psutil.Process(run.pid)
-        # its second child loads the nodes, while it loads the command
-        while len(children := process.children()) < 2:
-            time.sleep(0.01)
-        os.killpg(run.pid, signal.SIGINT)  # as a terminal does
-        _, said = run.communicate()
-    assert (run.returncode, said) == (130, "uam: interrupted\n")
-    _, left = psutil.wait_procs(children, timeout=30)
-    assert not left
+    for _ in range(3):
+        with subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        ) as run:
+            process = psutil.Process(run.pid)
+            # its second child loads the nodes, while it loads the command
+            while len(children := process.children()) < 2:
+                time.sleep(0.01)
+            os.killpg(run.pid, signal.SIGINT)  # as a terminal does
+            told, said = run.communicate()
+        _, left = psutil.wait_procs(children, timeout=30)
+        assert not left
+        if not told:  # else this test has stalled, and the interrupted flight tells its results
+            break
+    assert (run.returncode, told, said) == (130, "", "uam: interrupted\n")

@@ -46,6 +46,9 @@ def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
             flight.launch()
         assert flight.start() == "arming"
         assert flight.wait_for("hover", 60.0).state == "flying"
+        flight.hold()  # first: the hover of the scenario lasts seconds only
+        held = flight.wait_for("holding", 30.0)
+        assert held.cause == "hold by command"
         old, new = flight.set_parameters("position_controller", lambda_1=[2.0, 2.0, 2.0])[
             "position_controller"
         ]["lambda_1"]
@@ -54,9 +57,6 @@ def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
             flight.set_parameters("position_controller", lambda_1=[-2.0, 2.0, 2.0])
         with pytest.raises(CommandRefused, match="nonsense: unknown"):
             flight.set_parameters("mission", nonsense=1.0)
-        flight.hold()
-        held = flight.wait_for("holding", 30.0)
-        assert held.cause == "hold by command"
         with pytest.raises(CommandRefused, match="not while holding"):
             flight.start()
         flight.resume()
@@ -92,8 +92,8 @@ def test_several_at_once_with_asyncio(short_scenario, tmp_path):
 
 
 @pytest.mark.long
-def test_a_block_that_is_left_stops_its_flight(short_scenario, tmp_path):
-    with Flight(scenario=short_scenario, out=tmp_path) as flight:
+def test_a_block_that_is_left_stops_its_flight(long_scenario, tmp_path):
+    with Flight(scenario=long_scenario, out=tmp_path) as flight:
         flight.wait_for("take-off", 60.0)
     assert not flight.running and not flight.result.completed
     assert flight.result.outcome.interrupted and len(flight.result["time"]) > 10

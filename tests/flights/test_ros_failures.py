@@ -33,8 +33,8 @@ def kept(flight):
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("autopilot", "recorder")),
     ],
 )
-def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim):
-    flight = fly("--scenario", str(short_scenario))
+def test_a_killed_node_ends_the_flight_and_is_named(fly, long_scenario, victim):
+    flight = fly("--scenario", str(long_scenario))
     flight.until_phase("take-off")
     nodes = flight.children()
     assert len(nodes) == 10
@@ -61,8 +61,8 @@ def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario)
 
 @pytest.mark.long
 @pytest.mark.skipif(room().verdict is not Verdict.OK, reason=room().advice)
-def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
-    flight = fly("--scenario", str(short_scenario))
+def test_a_recorder_without_processor_time_loses_nothing(fly):
+    flight = fly("--scenario", "hover")  # longer than the stops
     flight.until_phase("take-off")
     recorder, stops = psutil.Process(flight.children()["recorder"]), []
     for _ in range(3):  # the plant waits for it meanwhile, so the flight is not over
@@ -85,8 +85,8 @@ def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
 
 
 @pytest.mark.slow
-def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
-    flight = fly("--scenario", str(short_scenario))
+def test_a_node_that_hangs_is_named_and_killed(fly, long_scenario):
+    flight = fly("--scenario", str(long_scenario))
     flight.until_phase("take-off")
     nodes = flight.children()
     os.kill(nodes["arm_controller"], signal.SIGSTOP)
@@ -98,8 +98,8 @@ def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
     kept(flight)
 
 
-def test_ctrl_c_keeps_what_was_flown(fly, short_scenario):
-    flight = fly("--scenario", str(short_scenario), report=True)
+def test_ctrl_c_keeps_what_was_flown(fly, long_scenario):
+    flight = fly("--scenario", str(long_scenario), report=True)
     flight.until_phase("take-off")
     nodes = flight.children()
     flight.process.send_signal(signal.SIGINT)
@@ -111,8 +111,8 @@ def test_ctrl_c_keeps_what_was_flown(fly, short_scenario):
 
 
 @pytest.mark.long
-def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, short_scenario):
-    flight = fly("--scenario", str(short_scenario))
+def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, long_scenario):
+    flight = fly("--scenario", str(long_scenario))
     flight.until(lambda: "processes in ROS domain" in flight.said, "started")
     nodes = flight.children()
     flight.process.send_signal(signal.SIGINT)
@@ -121,8 +121,8 @@ def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, short_scenario):
     assert_nothing_left(flight, list(nodes.values()))
 
 
-def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
-    flight = fly("--scenario", str(short_scenario))
+def test_no_node_survives_a_killed_orchestrator(fly, long_scenario):
+    flight = fly("--scenario", str(long_scenario))
     flight.until_phase("take-off")
     nodes = flight.children()
     flight.process.kill()
