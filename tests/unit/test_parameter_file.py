@@ -47,8 +47,13 @@ def test_a_dump_over_a_profile_changes_what_it_names(tmp_path):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("/**: {ros__parameters: {adapt: true}}", "'/\\*\\*': name each node instead"),
-        ("a/mission: {ros__parameters: {}}\nmission: {ros__parameters: {}}", "two sections"),
+        ("/*/mission: {ros__parameters: {adapt: true}}", "name each node instead, or all of them"),
+        ("/**: {ros__parameters: {tilt_hld: 1.0}}", "'/\\*\\*': tilt_hld is no parameter of"),
+        ("/**: {ros__parameters: {law: mine}}", "position_controller: "),
+        ("/mission: {ros__parameters: {}}\nmission: {ros__parameters: {}}", "two sections"),
+        ("/uav2/mission: {ros__parameters: {tilt_hold: 0.7}}", "/uav2, not /: name the section 'm"),
+        ("uav2: {mission: {ros__parameters: {tilt_hold: 0.7}}}", "/uav2, not /: name the section"),
+        ("uav2: {mission: {tilt_hold: 0.7}}", "'uav2/mission' has no 'ros__parameters' mapping"),
         ("mission: {ros__parameters: {takeoff_delay: '1'}}", "'1' is not numeric"),
     ],
 )
@@ -58,3 +63,39 @@ def test_what_cannot_be_meant_is_refused(tmp_path, text, complaint):
     s500 = str(configuration.path("profiles/s500.yaml"))
     with pytest.raises(ProfileError, match=complaint):
         load_profile(s500, str(file))
+
+
+BARE, FULL = "mission: {ros__parameters: {%s}}", "/uav1/mission: {ros__parameters: {%s}}"
+EVERY = "/**: {ros__parameters: {%s}}"
+
+
+@pytest.mark.parametrize(
+    ("namespace", "sections", "tilt_hold"),
+    [
+        ("/", {BARE: 0.6}, 0.6),
+        ("/uav1", {BARE: 0.6}, 0.6),
+        ("/uav1", {FULL: 0.7}, 0.7),
+        ("/uav1", {"uav1: {mission: {ros__parameters: {%s}}}": 0.7}, 0.7),
+        ("/uav1", {FULL: 0.7, BARE: 0.6}, 0.7),
+        ("/uav1", {EVERY: 0.5}, 0.5),
+        ("/", {BARE: 0.6, EVERY: 0.5}, 0.6),
+        ("/uav1", {FULL: 0.7, EVERY: 0.5}, 0.7),
+    ],
+)
+def test_sections_are_those_of_the_flights_namespace(tmp_path, namespace, sections, tilt_hold):
+    """As for nodes by hand with --params-file, see docs/interfaces.md."""
+    file = tmp_path / "mine.yaml"
+    file.write_text("\n".join(text % f"tilt_hold: {value}" for text, value in sections.items()))
+    found = load_profile("s500", str(file), namespace=namespace)
+    base = load_profile("s500")
+    assert found.sets["mission"].tilt_hold == tilt_hold != base.sets["mission"].tilt_hold
+    assert found.sets["arm_controller"] == base.sets["arm_controller"]
+
+
+def test_a_section_of_every_node_gives_each_node_what_it_has(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("/**: {ros__parameters: {use_sim_time: true, varpi: 0.3, thrust_max: 30.0}}")
+    found, base = load_profile("s500", str(file)), load_profile("s500")
+    assert {found.sets[f"{one}_controller"].varpi for one in ("position", "arm")} == {0.3}
+    assert found.sets["position_controller"].thrust_max == 30.0
+    assert found.sets["state_estimator"] == base.sets["state_estimator"]

@@ -28,7 +28,7 @@ from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
 from uam_control.settings import configuration
-from uam_control.settings.parameter_file import ProfileError, read_sections
+from uam_control.settings.parameter_file import EVERY_NODE, ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
@@ -134,19 +134,53 @@ def parameter_set(
     return controller_parameters(law.kind, limits), vehicle.coordinates[part]
 
 
-def load_profile(*names_or_files: str, vehicle: VehicleDescription | None = None) -> Profile:
+def load_profile(
+    *names_or_files: str, vehicle: VehicleDescription | None = None, namespace: str = "/"
+) -> Profile:
     """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError.
 
     With several profiles, a later one replaces single parameters of the earlier ones. Parameters
     that no profile has come from the vehicle (None: the default one), where they follow from it.
+    namespace: of the vehicle's nodes, see `read_sections`.
     """
     sections: dict[str, dict[str, Any]] = {}
     files = [_file(given) for given in names_or_files]
     for file in files:
-        for node, values in read_sections(file).items():
+        found = read_sections(file, namespace)
+        for node, values in _shared(file, found, sections, vehicle):
+            sections[node] = sections.get(node, {}) | values
+        for node, values in found.items():
             sections[node] = sections.get(node, {}) | values
     found = profile_of(sections, files[-1], vehicle)
     return replace(found, name="+".join(file.stem for file in files))
+
+
+def _shared(
+    file: Path,
+    found: dict[str, dict[str, Any]],
+    before: Mapping[str, Mapping[str, Any]],
+    vehicle: VehicleDescription | None,
+) -> list[tuple[str, dict[str, Any]]]:
+    """Take the section of every node from those `found`; return its values for each node.
+
+    before: the sections that these replace. A node has the values whose names it has; a name that
+    no node has is refused. Raises ProfileError.
+    """
+    shared, rows, known = found.pop(EVERY_NODE, {}), [], set()
+    for node in NODES if shared else ():
+        merged = {**before.get(node, {}), **shared, **found.get(node, {})}
+        try:
+            kind, _ = parameter_set(node, merged, vehicle)
+        except ParameterError as error:
+            raise ProfileError(f"{file}: {node}: {error}") from None
+        has = (*kind.specs(), *FLIGHT_OWN[node])
+        known.update(has)
+        rows.append((node, {name: value for name, value in shared.items() if name in has}))
+    if unknown := [name for name in shared if name not in known]:
+        raise ProfileError(
+            f"{file}: '/**': {unknown[0]} is no parameter of {', '.join(NODES)}; name its node"
+        )
+    return rows
 
 
 def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Profile:

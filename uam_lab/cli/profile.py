@@ -43,7 +43,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     require_ros()
     given = [str(configuration.named("profiles", one)) for one in options.profile]
-    return switch(load_profile(*given), *chosen_flight(options))
+    domain, namespace = chosen_flight(options)
+    return switch(load_profile(*given, namespace=namespace), domain, namespace)
 
 
 def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:

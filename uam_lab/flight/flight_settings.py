@@ -262,7 +262,9 @@ def settings(
     given = [profile] if isinstance(profile, str | Path) else profile
     flown = (
         load_profile(
-            *(str(configuration.named("profiles", str(one))) for one in given), vehicle=described
+            *(str(configuration.named("profiles", str(one))) for one in given),
+            vehicle=described,
+            namespace=namespace,
         )
         if given
         else default_profile(controller, described)

@@ -319,7 +319,9 @@ class Flight:
     def set_profile(self, *names_or_files: str | Path) -> Changes:
         """Switch to another profile in flight, see `load_profile`; otherwise as set_parameters."""
         given = [str(configuration.named("profiles", str(one))) for one in names_or_files]
-        return self._commands().switch(load_profile(*given, vehicle=self.settings.vehicle))
+        flown = self.settings
+        profile = load_profile(*given, vehicle=flown.vehicle, namespace=flown.namespace)
+        return self._commands().switch(profile)
 
     def inject(self, fault: str, duration: float = math.inf, **parameters: Any) -> None:
         """Inject a fault of a process now, as inject("node_stall", 2.0, node="arm_controller").
