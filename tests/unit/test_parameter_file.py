@@ -99,3 +99,13 @@ def test_a_section_of_every_node_gives_each_node_what_it_has(tmp_path):
     assert {found.sets[f"{one}_controller"].varpi for one in ("position", "arm")} == {0.3}
     assert found.sets["position_controller"].thrust_max == 30.0
     assert found.sets["state_estimator"] == base.sets["state_estimator"]
+
+
+@pytest.mark.parametrize("text", ["mission: {ros__parameters: {tilt_hold: 0.7}}", "{}"])
+def test_a_partial_file_alone_is_refused_with_what_it_needs(tmp_path, text):
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    complaint = "position_controller: inertia is missing: 3 numbers, each .*; a file with a part of"
+    with pytest.raises(ProfileError, match=complaint) as refused:
+        load_profile(str(file))
+    assert str(refused.value).endswith("as --profile s500 --profile mine.yaml")

@@ -29,7 +29,7 @@ from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import EVERY_NODE, ProfileError, read_sections
-from uam_control.settings.parameter_set import ParameterError, ParameterSet
+from uam_control.settings.parameter_set import MissingParameter, ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
@@ -237,6 +237,10 @@ def profile_of(
         try:
             kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))
+        except MissingParameter as error:
+            hint = "a file with a part of the parameters needs a whole profile before it"
+            text = f"{file}: {node}: {error}; {hint}, as --profile s500 --profile {file.name}"
+            raise ProfileError(text) from None
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
     return Profile(file.stem, file, vehicle, sets, sections)

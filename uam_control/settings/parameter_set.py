@@ -21,6 +21,10 @@ class ParameterError(ValueError):
     """A parameter set that is not valid; the message has the parameter and the allowed range."""
 
 
+class MissingParameter(ParameterError):
+    """A parameter without a default that has no value."""
+
+
 @dataclass(frozen=True)
 class Bound:
     """Meaning, unit and range of a numeric parameter.
@@ -153,7 +157,8 @@ class ParameterSet:
     def validated(self, axes: int = 0) -> Self:
         """Return this set with floats and tuples of floats; raise ParameterError if one is invalid.
 
-        axes: number of entries of a per-axis vector.
+        axes: number of entries of a per-axis vector. A parameter without a default that has no
+        value raises MissingParameter.
         """
         clean = {}
         for name, spec in self.specs().items():
@@ -161,6 +166,8 @@ class ParameterSet:
             if isinstance(spec, Bound):
                 if spec.length == 0 and value is getattr(type(self), name):
                     value = axes * value  # the default, repeated for every axis
+                if isinstance(value, tuple) and not value:
+                    _check_not_required(name, spec, axes)
                 clean[name] = _number(name, value, spec, axes)
             elif isinstance(spec, Choice) and value not in spec.choices:
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
@@ -174,6 +181,13 @@ class ParameterSet:
 
     def check_together(self) -> None:
         """Raise ParameterError if valid values contradict each other."""
+
+
+def _check_not_required(name: str, spec: Bound, axes: int) -> None:
+    """Raise MissingParameter for a list that must not be empty."""
+    count = spec.length or axes
+    if count and count != ANY_LENGTH and not spec.optional:
+        raise MissingParameter(f"{name} is missing: {count} numbers, each {spec.allowed}")
 
 
 def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
