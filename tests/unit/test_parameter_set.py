@@ -2,8 +2,10 @@
 
 import math
 import re
+from array import array
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from uam_control.settings.parameter_set import (
@@ -43,6 +45,9 @@ def test_a_count_stays_an_integer():
         ({"file": 3}, "file: 3 is no text; allowed: a name; empty: none"),
         ({"start": [0.1]}, "start: a list of 2 numbers expected"),
         ({"start": [0.1, 2.0]}, "is outside -1 to 1 rad"),
+        ({"start": array("d", [0.1])}, "start: a list of 2 numbers expected, got [0.1]; each"),
+        ({"start": array("d", [0.1, 2.0])}, "start: [0.1, 2.0] is outside"),
+        ({"start": np.array([True, False])}, "start: [True, False] is not numeric"),
     ],
 )
 def test_counts_texts_and_optional_lists_are_refused_with_the_reason(values, reason):

@@ -204,8 +204,9 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
         numbers = np.asarray(value)
     except ValueError:  # lists of different lengths
         numbers = np.array(None)
+    shown = value.tolist() if hasattr(value, "tolist") else value  # ROS gives an array
     if numbers.dtype.kind not in "iuf":  # refuses true and "1" too
-        raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}")
+        raise ParameterError(f"{name}: {shown!r} is not numeric; allowed: {allowed}")
     numbers = numbers.astype(float)
     shape = () if spec.length is None else (spec.length or axes,)
     if spec.length == ANY_LENGTH and numbers.ndim == 1:
@@ -213,7 +214,7 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
     if numbers.shape != shape:
         required = "one number" if spec.length is None else f"a list of {shape[0]} numbers"
         required = "a list of numbers" if spec.length == ANY_LENGTH else required
-        raise ParameterError(f"{name}: {required} expected, got {value!r}; each {allowed}")
+        raise ParameterError(f"{name}: {required} expected, got {shown!r}; each {allowed}")
     if not np.all((numbers >= spec.low) & (numbers <= spec.high)):  # refuses NaN too
-        raise ParameterError(f"{name}: {value!r} is outside {allowed}")
+        raise ParameterError(f"{name}: {shown!r} is outside {allowed}")
     return float(numbers) if spec.length is None else tuple(numbers.tolist())
