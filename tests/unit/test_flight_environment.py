@@ -34,6 +34,14 @@ def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
     assert made[name] == value and made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
+def test_a_discovery_server_of_the_users_shell_is_left_out(tmp_path, monkeypatch):
+    """With it the nodes of a flight found nothing; ROS reads an empty value as none."""
+    monkeypatch.setenv("ROS_DISCOVERY_SERVER", "127.0.0.1:11811")
+    assert node_environment.environment(42, tmp_path)["ROS_DISCOVERY_SERVER"] == ""
+    assert node_environment.transport_environment()["ROS_DISCOVERY_SERVER"] == ""
+    assert "ROS_DISCOVERY_SERVER=''" in node_environment.export_line(42)
+
+
 def test_threads_of_another_middleware_are_not_known(monkeypatch):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
     assert "supports Fast DDS only, not rmw_cyclonedds_cpp" in node_environment.without_discovery()

@@ -55,7 +55,8 @@ VARIABLES = {
         f": {BY_HAND} use it",
     ),
     "ROS_DISCOVERY_SERVER": Variable(
-        ": nodes use only that server for discovery", "unset {}, or start the server"
+        ": nodes started by hand use only that server for discovery; uam fly does not use it",
+        "unset {}, or start the server",
     ),
     "FASTDDS_BUILTIN_TRANSPORTS": Variable(
         " changes the transport of messages", "unset {}, unless it is intended"

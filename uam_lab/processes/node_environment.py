@@ -52,13 +52,15 @@ def transport_environment() -> dict[str, str]:
     """Return the variables that restrict ROS to this machine.
 
     The transports of config/dds/fastdds.xml do so themselves. With the user's own file or another
-    middleware the discovery range is set to LOCALHOST.
+    middleware the discovery range is set to LOCALHOST. A discovery server of the user's shell is
+    left out: the nodes would wait for it and find each other nowhere else.
     """
     transports = str(configuration.path("dds/fastdds.xml"))
     chosen = os.environ.get(PROFILES_FILE) or transports
     ours = chosen == transports and FAST_DDS in middleware()
     return {
         PROFILES_FILE: chosen,
+        "ROS_DISCOVERY_SERVER": "",  # as if it were not set
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
     }
 
