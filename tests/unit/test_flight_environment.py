@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from uam_lab.processes import node_environment
+from uam_lab.flight import flight_settings
+from uam_lab.processes import middleware, node_environment
 
 
 def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
@@ -60,7 +61,33 @@ def test_the_line_for_ros2_works_when_pasted(monkeypatch, tmp_path):
     text = subprocess.run(shell, capture_output=True, text=True, check=True).stdout
     found = dict(one.split("=", 1) for one in text.split("\0") if one)
     assert found["ROS_DOMAIN_ID"] == "17"
-    assert found["RMW_IMPLEMENTATION"] == node_environment.middleware()
+    assert found["RMW_IMPLEMENTATION"] == middleware.middleware()
     assert found["AMENT_PREFIX_PATH"].split(":")[0] == odd
     for name, value in node_environment.transport_environment().items():
         assert found[name] == value
+
+
+def test_a_middleware_that_is_not_installed_is_named_before_ros_ends_the_process(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(middleware.sys, "prefix", str(tmp_path / "venv"))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "jazzy"))
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
+    assert middleware.refusal() == "", "no list of what is installed"
+    own, sourced = (tmp_path / one / middleware.INDEX for one in ("venv", "jazzy"))
+    own.mkdir(parents=True)
+    (own / "rmw_fastrtps_cpp").touch()
+    (own / "rmw_implementation").touch()
+    complaint = (
+        "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp is not installed: unset it; "
+        "there are: rmw_fastrtps_cpp"
+    )
+    assert middleware.refusal() == complaint
+    monkeypatch.setattr(flight_settings.importlib.util, "find_spec", lambda name: name)
+    with pytest.raises(flight_settings.SettingsError, match="is not installed: unset it"):
+        flight_settings.require_ros()
+    sourced.mkdir(parents=True)
+    (sourced / "rmw_cyclonedds_cpp").touch()
+    assert middleware.refusal() == ""
+    monkeypatch.delenv("RMW_IMPLEMENTATION")
+    assert middleware.refusal() == ""

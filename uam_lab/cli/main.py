@@ -14,7 +14,7 @@ import threading
 from collections.abc import Iterator, Sequence
 
 from uam_lab.flight.ros import FORKER
-from uam_lab.processes import child
+from uam_lab.processes import child, middleware
 from uam_lab.processes.interrupts import INTERRUPTED
 
 WITHOUT_NODES = {"-h", "--help", "direct", "--engine=direct"}
@@ -24,7 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     given = sys.argv[1:] if arguments is None else arguments
     with _ended_by_interrupt():
-        if given[:1] == ["fly"] and not WITHOUT_NODES.intersection(given):
+        with_nodes = given[:1] == ["fly"] and not WITHOUT_NODES.intersection(given)
+        if with_nodes and not middleware.refusal():
             child.prepare_early([FORKER])
         from uam_lab.cli.parser import parsed, run  # takes a second or two
 

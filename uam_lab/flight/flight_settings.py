@@ -24,6 +24,7 @@ from uam_control.vehicle import (
 )
 from uam_lab.flight import arm_on_ground, node_options
 from uam_lab.flight.node_options import SettingsError
+from uam_lab.processes import middleware
 from uam_lab.processes.node_environment import without_discovery
 from uam_msgs_py.node import process_options
 from uam_msgs_py.node.namespace import normal
@@ -394,12 +395,14 @@ def check_clock(engine: str, clock: str) -> None:
 
 
 def require_ros() -> None:
-    """Raise SettingsError if ROS is not installed."""
+    """Raise SettingsError if ROS, or the middleware that it shall use, is not installed."""
     if importlib.util.find_spec("rclpy") is None:
         raise SettingsError(
             "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
             "installation, or fly with --engine direct"
         )
+    if reason := middleware.refusal():
+        raise SettingsError(reason)
 
 
 def _left_out(without: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:

@@ -11,6 +11,7 @@ from uam_control.settings import configuration
 from uam_lab.processes import thread_stop
 from uam_lab.processes.borrowed_environment import copied
 from uam_lab.processes.child import SINGLE_THREAD
+from uam_lab.processes.middleware import middleware
 
 PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 FAST_DDS = "fastrtps"  # in the names of its middlewares
@@ -63,11 +64,6 @@ def transport_environment() -> dict[str, str]:
         "ROS_DISCOVERY_SERVER": "",  # as if it were not set
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
     }
-
-
-def middleware() -> str:
-    """Return the middleware that ROS will use."""
-    return os.environ.get("RMW_IMPLEMENTATION") or f"rmw_{FAST_DDS}_cpp"
 
 
 def without_discovery() -> str:
