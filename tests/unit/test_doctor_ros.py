@@ -26,6 +26,11 @@ OK, WARN, FAIL = Verdict
         ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", WARN),
         ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST", OK),
         ("ROS_DISCOVERY_SERVER", "127.0.0.1:11811", WARN),
+        ("ROS_SECURITY_ENABLE", "true", WARN),
+        ("ROS_SECURITY_ENABLE", "false", OK),
+        ("ROS_SECURITY_STRATEGY", "Enforce", WARN),
+        ("ROS_SECURITY_STRATEGY", "Permissive", OK),
+        ("ROS_SECURITY_KEYSTORE", "/no/such/keys", WARN),
         ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4", WARN),
     ],
 )

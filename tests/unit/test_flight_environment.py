@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flight import flight_settings
 from uam_lab.processes import middleware, node_environment
 
@@ -91,3 +92,29 @@ def test_a_middleware_that_is_not_installed_is_named_before_ros_ends_the_process
     assert middleware.refusal() == ""
     monkeypatch.delenv("RMW_IMPLEMENTATION")
     assert middleware.refusal() == ""
+
+
+@pytest.mark.parametrize(
+    ("surroundings", "arguments", "complaint"),
+    [
+        (
+            {
+                "ROS_SECURITY_ENABLE": "true",
+                "ROS_SECURITY_STRATEGY": "Enforce",
+                "ROS_SECURITY_KEYSTORE": "/no/such/keys",
+            },
+            [],
+            "ROS does not start: SECURITY ERROR: directory '/no/such/keys/enclaves' does not exist"
+            "; ROS_SECURITY_ENABLE is true: unset it, or docs/security.md",
+        ),
+        ({}, ["-r", "uam/state:=x y"], "Couldn't parse remap rule: '-r uam/state:=x y'"),
+    ],
+)
+def test_what_keeps_ros_from_starting_is_an_error_of_the_user(surroundings, arguments, complaint):
+    pytest.importorskip("rclpy")
+    from uam_lab.processes.guest import Guest
+
+    with pytest.raises(ConfigurationError) as refused:
+        Guest("uam_test", {"ROS_SECURITY_ENABLE": "", **surroundings}, arguments=arguments)
+    assert complaint in str(refused.value)
+    assert "\n" not in str(refused.value) and "/src/rcl" not in str(refused.value)
