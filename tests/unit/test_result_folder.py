@@ -1,15 +1,18 @@
 """The result folder: its name, the link to the newest, refusals, and what is written to it."""
 
+import errno
 import json
 import os
 import subprocess
+from argparse import Namespace
 from datetime import datetime
 
 import numpy as np
 import pytest
 import yaml
 
-from uam_lab.results import result_folder
+from uam_lab.cli import parser
+from uam_lab.results import atomic, result_folder
 from uam_lab.results.result_folder import ResultFolder, ResultFolderError
 
 NOON = datetime(2026, 3, 1, 12, 0, 5)
@@ -145,3 +148,17 @@ def test_the_commit_is_that_of_the_checkout_and_says_when_it_was_edited(tmp_path
     assert result_folder.git_commit(tmp_path) == head[:12] + "+changes"
     (tmp_path / "site-packages").mkdir()
     assert result_folder.git_commit(tmp_path / "site-packages") is None
+
+
+def test_a_full_disk_is_named_with_the_file_and_is_no_wrong_use(here, capsys):
+    def fill(options):
+        with atomic.replacing(here / "flight" / "metrics.json"):
+            raise OSError(errno.ENOSPC, "No space left on device")  # as of a write: no file
+
+    assert parser.run(Namespace(command="fly", run=fill)) == 1
+    assert capsys.readouterr().err == (
+        f"uam fly: metrics.json is not written, no space left on device in {here}/flight: the "
+        "results there are incomplete, and a log may end early\n"
+    )
+    missing = here / "no such" / "metrics.json"
+    assert parser.run(Namespace(command="fly", run=lambda _: atomic.write_text(missing, ""))) == 2

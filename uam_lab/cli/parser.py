@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
 from uam_lab.processes.interrupts import INTERRUPTED
+
+NOT_WRITTEN = 1  # exit status
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 # Subcommands and their modules; each module has add(subparsers), which sets `run`: arguments → exit
 # status. Only the module of the chosen command is imported: all of them take seconds.
@@ -77,5 +82,20 @@ def run(options: argparse.Namespace) -> int:
     except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
         return 1
     except (*USER_ERRORS, OSError) as error:
+        if getattr(error, "errno", None) in FULL:
+            print(f"uam {options.command}: {_full(error)}", file=sys.stderr)
+            return NOT_WRITTEN
         print(f"uam {options.command}: {error}", file=sys.stderr)
         return WRONG_USE
+
+
+def _full(error: OSError) -> str:
+    """Return the text about a disk without room."""
+    text = (error.strerror or str(error)).lower()
+    if error.filename is None:
+        return text
+    file = Path(error.filename)
+    return (
+        f"{file.name} is not written, {text} in {file.absolute().parent}: the results there are "
+        "incomplete, and a log may end early"
+    )

@@ -13,12 +13,17 @@ from pathlib import Path
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block raises no exception.
 
-    The temporary name keeps the suffix, because writers select their format by it.
+    The temporary name keeps the suffix, because writers select their format by it. An OSError of a
+    write, which names no file (a full disk), is raised with `path`.
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 
