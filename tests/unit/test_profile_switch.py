@@ -8,9 +8,11 @@ pytest.importorskip("rclpy")
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import parameter_value_to_python
 
+from uam_lab.flight.operator import NoFlight
 from uam_lab.flight.ros.profile_switch import (
     APPLY,
     NO_RESPONSE,
+    NOT_FOUND,
     ProfileSwitch,
     SwitchIncomplete,
     SwitchRefused,
@@ -62,3 +64,24 @@ def test_a_node_that_stays_silent_is_named_and_does_not_keep_the_others_from_the
         "two: may have the new values: no response",
     ]
     assert set(nodes.gains.values()) == {1.0}
+
+
+class Alone(ProfileSwitch):
+    """`there`: the nodes that exist."""
+
+    def __init__(self, *there: str) -> None:
+        self._there = there
+        self._node = SimpleNamespace(
+            context=SimpleNamespace(get_domain_id=lambda: 7),
+            resolve_service_name=lambda name: f"/uav2/{name}",
+        )
+
+    def _call(self, kind, service, requests):
+        return {}, {node: NOT_FOUND for node in requests if node not in self._there}
+
+
+def test_without_any_node_there_is_no_flight_and_nothing_that_refuses():
+    with pytest.raises(NoFlight, match=r"^no node /uav2/one, /uav2/two, .* in ROS domain 7: start"):
+        Alone().change(WANTED)
+    with pytest.raises(SwitchRefused, match="^two: service not found\nthree: service not found$"):
+        Alone("one").change(WANTED)

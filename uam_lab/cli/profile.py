@@ -9,7 +9,7 @@ from typing import Any
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command, chosen_flight
-from uam_lab.flight.flight_settings import require_ros
+from uam_lab.flight.flight_settings import SettingsError, require_ros
 
 CHANGED, REFUSED = 0, 1
 EXAMPLES = """\
@@ -48,7 +48,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
-    """Switch the nodes of a vehicle, print the changes; return the exit status."""
+    """Switch the nodes of a vehicle, print the changes; return the exit status.
+
+    Raises SettingsError if none of them is there.
+    """
+    from uam_lab.flight.operator import NoFlight
     from uam_lab.flight.ros.profile_switch import (
         ProfileSwitch,
         SwitchIncomplete,
@@ -61,6 +65,8 @@ def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
     with Guest("uam_profile", environment, domain, namespace) as guest:
         try:
             changed = ProfileSwitch(guest.node).switch(profile)
+        except NoFlight as error:
+            raise SettingsError(str(error)) from None
         except SwitchRefused as refusal:
             whole = not isinstance(refusal, SwitchIncomplete)
             state = "nothing changed" if whole else "but not all nodes have their old values"

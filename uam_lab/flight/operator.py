@@ -26,6 +26,14 @@ PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as lo
 class NoFlight(RuntimeError):
     """No flight answers; the text is one line and says what to do."""
 
+    @classmethod
+    def seen_by(cls, node: Node, complaint: str) -> NoFlight:
+        """Return the error of a client `node` for a complaint, as "no service /mission/start"."""
+        return cls(
+            f"{complaint} in ROS domain {node.context.get_domain_id()}: "
+            "start a flight, or choose it by --instance, --namespace or ROS_DOMAIN_ID"
+        )
+
 
 class Operator:
     """Client of one flight; `node`: a node in its ROS domain and namespace, not spun by others."""
@@ -153,8 +161,5 @@ class Operator:
         end = time.monotonic() + PATIENCE
         while not done():
             if time.monotonic() > end:
-                raise NoFlight(
-                    f"{complaint} in ROS domain {self._node.context.get_domain_id()}: "
-                    "start a flight, or choose it by --instance, --namespace or ROS_DOMAIN_ID"
-                )
+                raise NoFlight.seen_by(self._node, complaint)
             self._executor.spin_once(timeout_sec=0.05)

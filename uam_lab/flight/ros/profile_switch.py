@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_control.profiles.profile import CONTROLLERS, NODES, Profile
+from uam_lab.flight.operator import NoFlight
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.node_parameters import plain
 from uam_msgs_py.node.tunable import CHECK
@@ -27,6 +28,7 @@ PATIENCE = 10.0  # [s] wall time to find a service, and the same to receive its 
 AGAIN = 1.0  # [s] after which a request is repeated
 APPLY = "set_parameters_atomically"
 NO_RESPONSE = "no response"
+NOT_FOUND = "service not found"
 
 Values = dict[str, Any]
 
@@ -50,7 +52,7 @@ class ProfileSwitch:
     def switch(self, profile: Profile) -> dict[str, dict[str, tuple[Any, Any]]]:
         """Activate `profile`; return the changes: node → name → (old, new).
 
-        Raises SwitchRefused without any change, SwitchIncomplete.
+        Raises SwitchRefused without any change, SwitchIncomplete; NoFlight if no node is there.
         """
         return self.change(_desired(profile))
 
@@ -89,6 +91,9 @@ class ProfileSwitch:
         listed, missing = self._call(
             ListParameters, "list_parameters", {n: ListParameters.Request() for n in desired}
         )
+        if missing and all(missing.get(node) == NOT_FOUND for node in desired):
+            nodes = ", ".join(map(self._node.resolve_service_name, desired))
+            raise NoFlight.seen_by(self._node, f"no node {nodes}")
         self._all_accept(missing)
         names = {
             node: [name for name in values if name in listed[node].result.names]
@@ -141,7 +146,7 @@ class ProfileSwitch:
         try:
             missing = self._missing(lambda node: clients[node].service_is_ready(), clients)
             if missing:
-                return {}, dict.fromkeys(missing, "service not found")
+                return {}, dict.fromkeys(missing, NOT_FOUND)
             calls = {node: _Call(clients[node], requests[node]) for node in clients}
             missing = self._missing(lambda node: calls[node].done(), calls)
             answers = {node: call.response for node, call in calls.items() if node not in missing}
