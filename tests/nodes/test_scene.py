@@ -3,6 +3,8 @@
 import numpy as np
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 
 from uam_control.coordinates import coordinates
 from uam_lab.recording.message_definitions import schema
@@ -102,6 +104,7 @@ def test_frames_urdf_and_markers_of_a_simulated_flight(start, probe):
     assert "<robot" in rig.robot[-1].data
     frames = (stamps[-1] - stamps[0]) / FRAME
     assert len(stamps) <= frames + 2, "25 Hz of the messages' time, however fast they come"
+    assert deserialize_message(rig.errors[-1], JointState).header.frame_id == "world"
     _, position, velocity = read_joints(rig.errors[-1], list(COORDINATES))
     assert position.round(9).tolist() == [-0.2, 0, 0, 0.1, 0, 0, 0, -0.5]
     assert velocity.round(9).tolist() == [0, 0, 0, 0, -0.2, 0, 0, 0]

@@ -99,7 +99,7 @@ class SceneNode(UamNode):
         self._tf = self.publisher(topics.TF)
         self._markers = self.publisher(topics.MARKERS)
         self._error = self.publisher(topics.TRACKING_ERROR)
-        self._error_writer = JointStateWriter(described.coordinates)
+        self._error_writer = JointStateWriter(described.coordinates, WORLD)
         self._describe(urdf(vehicle))
         self.listen(topics.MISSION_STATUS, self._on_status)
         # other topics are polled when a status arrives or after `wake_up`

@@ -35,10 +35,11 @@ SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
 class JointStateWriter(Template):
     """Writes a JointState: set the views position, velocity, effort (n,), publish `stamped`."""
 
-    def __init__(self, names: Sequence[str]):
-        """names: of the n joints."""
+    def __init__(self, names: Sequence[str], frame: str = ""):
+        """names: of the n joints; frame: in which they are, "" for none."""
         zeros = [0.0] * len(names)
-        super().__init__(JointState(name=list(names), position=zeros, velocity=zeros, effort=zeros))
+        made = JointState(name=list(names), position=zeros, velocity=zeros, effort=zeros)
+        super().__init__(made, frame)
         self.position, self.velocity, self.effort = self.values.values()
 
 
