@@ -91,6 +91,8 @@ CONTENTS = {
     topics.TRACKING_ERROR: Content(WORLD, "m, rad; /s", FRAMES, "scene", "viewers"),
     topics.MARKERS: Content(WORLD, "m", "2 Hz and on change", "scene", "viewers"),
     topics.RECORDED_UNTIL: Content("", "s", "up to 50 Hz of wall time", "recorder", "mujoco_sim"),
-    topics.DIAGNOSTICS: Content("", "text", "1 Hz each node", "every node", "mujoco_sim, cockpit"),
+    topics.DIAGNOSTICS: Content(
+        "", "text", "1 Hz each node", "every node but those of the cockpit", "mujoco_sim, cockpit"
+    ),
     topics.ROSOUT: Content("", "text", "on each line", "every node", "viewers"),
 }
