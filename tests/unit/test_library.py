@@ -34,12 +34,48 @@ from uam_sim_bridge.faults import FaultError
         ({"imu": "autopilot", "autopilot": "udp:127.0.0.1:14580"}, "needs --clock realtime"),
         ({"without": ["mission=my planner"]}, "'my planner' is no name of a node"),
         ({"without": ["scene=mine"]}, "unknown node to fly without 'scene'"),
+        ({"without": "scene=mine"}, "unknown node to fly without 'scene'"),
+        ({"faults": [3]}, "faults: a text or a list of texts expected, got 3"),
+        ({"controller": ["modular"]}, "unknown controller '['modular']'"),
+        ({"profile": 3}, "profile: a name, a path or a list of them expected, got 3"),
+        ({"profile": ["s500", 3]}, "profile: a name or a path expected, got 3"),
+        ({"out": 5}, "out: a name or a path expected, got 5"),
+        ({"seed": 1.5}, "seed: a whole number expected, got 1.5"),
+        ({"seed": True}, "seed: a whole number expected, got True"),
+        ({"instance": "a"}, "instance: a whole number expected, got 'a'"),
+        ({"payload_mass": "heavy"}, "payload_mass: a number expected, got 'heavy'"),
+        ({"observer": 3}, "observer: an Observer expected, got 3"),
+        ({"vehicle_changes": 3}, "vehicle_changes: dotted name → value expected, got 3"),
+        ({"vehicle_changes": {"air.nosuch": [1]}}, "unknown entry 'air.nosuch'; air has: drag, "),
+        ({"vehicle_changes": {"nosuch": 1}}, "unknown entry 'nosuch'; the vehicle has: "),
+        ({"vehicle_changes": {"air.gust.x": 1}}, "'air.gust.x'; air.gust has: nothing, it is a v"),
+        ({"vehicle_changes": {"air.wind": [1.0]}}, "air.wind: a list of 3 numbers expected, got ["),
+        ({"vehicle_changes": {"air.wind": "x"}}, "air.wind: a list of 3 numbers expected, got 'x'"),
+        ({"vehicle_changes": {"air.wind": [1, 2, np.nan]}}, "air.wind: a list of 3 numbers"),
+        ({"vehicle_changes": {"air.gust": [1.0]}}, "air.gust: a number expected, got [1.0]"),
+        ({"vehicle_changes": {"air.gust": -1.0}}, "vehicle_changes: air.gust: -1 is below 0"),
     ],
 )
 def test_wrong_options_are_refused_in_one_line(options, why):
     with pytest.raises(SettingsError) as refused:
         Flight(**options)
     assert why in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_one_text_is_a_list_of_one_and_numbers_may_be_numpys():
+    made = Flight(
+        without="mission=mine",
+        faults="imu_dropout@1+1",
+        plant_preset="laboratory",
+        effects="joint_gear=off",
+        seed=np.int64(3),
+        vehicle_changes={"air.wind": np.array([1.0, 0.0, 0.0]), "air.gust": np.float64(0.5)},
+    ).settings
+    assert made.foreign == ("mission",) and made.own_names == {"mission": "mine"}
+    assert len(made.faults.faults) == 1 and made.seed == 3
+    assert "joint_gear" not in made.vehicle_changes["effects"]
+    assert made.vehicle_changes["air.wind"] == [1.0, 0.0, 0.0]
+    assert made.vehicle_changes["air.gust"] == 0.5
 
 
 @pytest.mark.parametrize("fault", ["imu_stamps@1", "imu_dropout@1+1", "imu_bias@1:unit=companion"])

@@ -22,7 +22,7 @@ from uam_control.vehicle import (
     VehicleDescription,
     load_description,
 )
-from uam_lab.flight import arm_on_ground, node_options
+from uam_lab.flight import arm_on_ground, node_options, option_types
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes import middleware
 from uam_lab.processes.node_environment import without_discovery
@@ -143,10 +143,10 @@ def settings(
     imu: str = IMUS[0],
     plant: str = DEFAULT_PLANT,
     plant_preset: str | Sequence[str] = (),
-    effects: Sequence[str] = (),
+    effects: str | Sequence[str] = (),
     autopilot: str = BUILTIN,
     px4_dir: str | None = None,
-    px4_params: Sequence[str] = (),
+    px4_params: str | Sequence[str] = (),
     sim_address: str = HOST,
     gcs: str = "",
     payload_mass: float | None = None,
@@ -154,10 +154,10 @@ def settings(
     out: str | Path | None = None,
     vehicle_changes: dict[str, object] | None = None,
     instance: int | None = None,
-    without: Sequence[str] = (),
+    without: str | Sequence[str] = (),
     view: bool = False,
     log_limit: float = LOG_LIMIT,
-    faults: Sequence[str] = (),
+    faults: str | Sequence[str] = (),
     arm: bool = False,
     dry_run: bool = False,
     auto_start: bool = True,
@@ -173,6 +173,8 @@ def settings(
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
+    Where a list of texts is expected, one text is a list of one.
+
     end, transit_speed [m/s], transit_acceleration [m/s^2]: see `ScenarioOptions`; retime: slow the
     scenario down until it is feasible. profile: see `load_profile` for several profiles;
     plant_preset: names or files of effects of the plant, effects: changes to them, see
@@ -187,6 +189,32 @@ def settings(
     (InfeasibleReference too), ProfileError, Px4Error, PortError, PlantError, FaultError; each text
     is one line for the user.
     """
+    given = [profile] if isinstance(profile, str | Path) else [] if profile is None else profile
+    if not isinstance(given, Sequence):
+        raise SettingsError(f"profile: a name, a path or a list of them expected, got {profile!r}")
+    for name, paths in (
+        ("scenario", [scenario]),
+        ("vehicle", [vehicle]),
+        ("profile", given),
+        ("out", [] if out is None else [out]),
+    ):
+        for one in paths:
+            option_types.path(name, one)
+    seed = option_types.whole("seed", seed)
+    for name, value in (("instance", instance), ("domain", domain)):
+        if value is not None:
+            option_types.whole(name, value)
+    for name, value in (
+        ("payload_mass", payload_mass),
+        ("log_limit", log_limit),
+        ("inner_rate", inner_rate),
+    ):
+        if value is not None:
+            option_types.number(name, value)
+    without, faults = option_types.texts("without", without), option_types.texts("faults", faults)
+    effects = option_types.texts("effects", effects)
+    plant_preset = option_types.texts("plant_preset", plant_preset)
+    px4_params = option_types.texts("px4_params", px4_params)
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
@@ -255,12 +283,12 @@ def settings(
     if not 0 <= seed <= LAST_SEED:
         raise SettingsError(f"seed {seed} is outside 0..{LAST_SEED}")
     described = load_description(str(vehicle))
+    changes = option_types.vehicle_changes(vehicle_changes or {}, described.numbers)
     options = _scenario_options(
         end=end, transit_speed=transit_speed, transit_acceleration=transit_acceleration
     )
     source = str(configuration.named("scenarios", str(scenario)))
     loaded = load_scenario(source, described, options)
-    given = [profile] if isinstance(profile, str | Path) else profile
     flown = (
         load_profile(
             *(str(configuration.named("profiles", str(one))) for one in given),
@@ -292,9 +320,7 @@ def settings(
         feasible.check(loaded)
     arm_on_ground.check(described, loaded)
     injected = read_schedule(faults, loaded, seed)
-    acting = presets.read(
-        [plant_preset] if isinstance(plant_preset, str) else plant_preset, effects
-    )
+    acting = presets.read(plant_preset, effects)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     made = FlightSettings(
         scenario=loaded,
@@ -308,7 +334,7 @@ def settings(
         imu=imu,
         autopilot=autopilot,
         px4=px4,
-        px4_params=tuple(px4_params),
+        px4_params=px4_params,
         sim_address=sim_address,
         link=link,
         gcs=gcs,
@@ -318,7 +344,7 @@ def settings(
         scenario_options=options,
         notes=loaded.notes + slower + misfits(flown) + _unsteered(described, loaded, mass),
         instance=_instance_of(link) if instance is None else instance,
-        vehicle_changes=presets.added(vehicle_changes or {}, acting),
+        vehicle_changes=presets.added(changes, acting),
         without=left_out,
         own_names=own_names,
         faults=injected,
@@ -439,5 +465,5 @@ def _instance_of(link: LinkUrl | None) -> int | None:
 
 
 def _choice(name: str, value: str, allowed: Collection[str]) -> None:
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise SettingsError(f"unknown {name} '{value}'; there are: {', '.join(allowed)}")

@@ -64,6 +64,8 @@ class Flight:
         for name in options:
             if name not in known:
                 raise SettingsError(f"unknown option '{name}'; there are: {', '.join(known)}")
+        if observer is not None and not isinstance(observer, Observer):
+            raise SettingsError(f"observer: an Observer expected, got {observer!r}")
         options.setdefault("command", shlex.join(["python", *sys.argv]))
         self._prepare(flight_settings.settings(**options), observer, StopRequest())
 
