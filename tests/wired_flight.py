@@ -151,9 +151,18 @@ class Steps:
         self._last, self._own = used, None
 
 
-def wired_flight(scenario: str = "quick_pick", payload: float = 0.2) -> direct.DirectFlight:
-    """Return a flight of the default profile over sockets, before its first tick."""
+def wired_flight(
+    scenario: str = "quick_pick", payload: float = 0.2, **changes: object
+) -> direct.DirectFlight:
+    """Return a flight of the default profile over sockets, before its first tick.
+
+    changes: of the vehicle, see `Vehicle.changed`.
+    """
     with mock.patch.object(direct, "JoinedAutopilot", WiredAutopilot):
         return direct.DirectFlight(
-            load_scenario(scenario), load_profile("s500"), Vehicle.load(), payload, 1
+            load_scenario(scenario),
+            load_profile("s500"),
+            Vehicle.load().changed(changes),
+            payload,
+            1,
         )

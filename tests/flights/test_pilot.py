@@ -247,13 +247,13 @@ def _fly(flight: DirectFlight, do: Callable[[Case], None], sender) -> None:
 
 
 def outcomes(
-    at: str, cases: Iterable[Callable[[Case], None]], after: float = 0.0
+    at: str, cases: Iterable[Callable[[Case], None]], after: float = 0.0, **changes: object
 ) -> dict[str, Outcome]:
     """Fly the nominal mission into the phase `at`, then each case in a fork.
 
-    after [s]: time in the phase, 0 for that of AT.
+    after [s]: time in the phase, 0 for that of AT; changes: of the vehicle.
     """
-    flight, output = wired_flight(), None
+    flight, output = wired_flight(**changes), None
     while output is None or output.phase != at:
         flight.tick()
         output = flight.mission.output
@@ -315,8 +315,9 @@ def test_held_out_take_overs():
 
 @pytest.mark.slow
 def test_handed_back_above_the_payload_while_the_path_is_beside_its_place():
-    """2.6 s into the pick the path is shifted to the payload, and shifts on afterwards."""
-    assert_final(outcomes(PICK, (hold, position), 2.6))
+    """The path is shifted to a payload that stands 25 mm beside its place."""
+    beside = {"variation.payload_offset": [0.0, 0.025]}
+    assert_final(outcomes(PICK, (hold, position), **beside))
 
 
 @pytest.mark.slow
