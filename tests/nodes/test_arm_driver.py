@@ -83,7 +83,7 @@ def arm(probe, start, tmp_path):
 
 
 def test_joints_out_efforts_in_and_the_end(arm, probe):
-    rig = arm()
+    rig = arm("answer_timeout:=1.0")  # of the end, too: this process answers for the servos
     driven = [0.5 / 1.304, -0.3 / 1.304]
     rig.until_driven([0.5, -0.3], lambda: rig.draws(driven), "the efforts")
     probe.until(lambda: rig.joints, "joint states")
@@ -92,8 +92,11 @@ def test_joints_out_efforts_in_and_the_end(arm, probe):
     assert abs(stamp - probe.node.get_clock().now().nanoseconds) < 60e9
     rig.until_driven(
         [0.5, -0.3],
-        lambda: rig.reports(OK) and "nan" not in rig.values.values(),
-        "a healthy report of servos that have all been read",
+        # on a busy machine the bus is slower than the control rate, which is a warning
+        lambda: (
+            (rig.reports(OK) or rig.reports(WARN, "bus at")) and "nan" not in rig.values.values()
+        ),
+        "a report without an error of servos that have all been read",
     )
     assert rig.values["alpha_2 temperature [deg C]"] == "35"
     assert rig.values["alpha_1 torque"] == "on"
