@@ -245,8 +245,7 @@ class Guidance:
         acceleration [m/s^2]: in place of stop_acceleration. A descent ends: `stay` then sets the
         reference. A plan ends in a stop, too, on its curve.
         """
-        p, speed = self.parameters, float(np.linalg.norm(self.motion[CHI_DOT, POSITION]))
-        length = max(p.stop_time, RAMP * speed / (acceleration or p.stop_acceleration))
+        length = self._ramp_from(self.motion, acceleration=acceleration)
         for plan in self._plans.values():
             plan.stop(stamp, length)
         self._stop_clock(stamp, acceleration)
@@ -378,11 +377,16 @@ class Guidance:
         return max(p.stop_time, PEAK * float(np.max(back / peak)))
 
     def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:
-        """Return the time [s] to stop or to resume within stop_acceleration.
+        """Return the time [s] in which the path's clock stops or resumes; see `_ramp_from`."""
+        self._trajectory.write(self.scenario_time, self._path)
+        return self._ramp_from(self._path, shortest, acceleration)
+
+    def _ramp_from(
+        self, motion: np.ndarray, shortest: float = math.inf, acceleration: float | None = None
+    ) -> float:
+        """Return the time [s] to stop from motion (5, 6 + n) within stop_acceleration.
 
         shortest [s]: in place of a longer stop_time; acceleration [m/s^2]: of stop_acceleration.
         """
-        self._trajectory.write(self.scenario_time, self._path)
-        speed = float(np.linalg.norm(self._path[CHI_DOT, POSITION]))
-        shortest = min(shortest, self.parameters.stop_time)
-        return max(shortest, RAMP * speed / (acceleration or self.parameters.stop_acceleration))
+        p, speed = self.parameters, float(np.linalg.norm(motion[CHI_DOT, POSITION]))
+        return max(min(shortest, p.stop_time), RAMP * speed / (acceleration or p.stop_acceleration))

@@ -92,10 +92,10 @@ class Plan:
 
     def write(self, stamp: float, motion: np.ndarray) -> None:
         """Write the plan's columns of motion (5, 6 + n) at `stamp` [s]."""
-        time, *rates = self._clock.at(stamp)
-        rows = self.at(np.array([time]))[:, 0]
-        if tuple(rates) != STEADY:
-            scale(rows, tuple(rates))
+        now = self._clock.at(stamp)  # time, then its derivatives
+        rows = self.at(np.array(now[:1]))[:, 0]
+        if now[1:] != STEADY:
+            scale(rows, now[1:])
         motion[:, self.columns] = rows
 
     def samples(self, per_piece: int = 10) -> np.ndarray:

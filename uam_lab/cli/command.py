@@ -36,7 +36,7 @@ from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.presets import CALM, Effects
 from uam_sim_bridge.plant.engines import PlantError
-from uam_sim_bridge.ports import INSTANCES, PortError, flight_of, flights
+from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
 WRONG_USE = 2  # exit status
@@ -204,14 +204,6 @@ def chosen_flight(options: argparse.Namespace) -> tuple[int | None, str]:
     if flight is None:
         return None, namespace or "/"
     return flight.domain, namespace or flight.namespace
-
-
-def others_running() -> str:
-    """Return the flights of this computer, behind "; ", for a command that has found none."""
-    found = [
-        f"--instance {one.instance}: domain {one.domain}, {one.namespace}" for one in flights()
-    ]
-    return f" (running: {'; '.join(found)})" if found else ""
 
 
 def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Profile:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from uam_lab.cli.command import Command, chosen_flight, number, others_running
+from uam_lab.cli.command import Command, chosen_flight, number
 from uam_lab.flight.flight_settings import SettingsError, require_ros
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.N
         try:
             return act(Operator(guest.node), options)
         except NoFlight as error:
-            raise SettingsError(f"{error}{others_running()}") from None
+            raise SettingsError(str(error)) from None
 
 
 def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:

@@ -17,6 +17,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import ChecklistItem, read_items
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
+from uam_sim_bridge.ports import flights
 
 PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
 AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
@@ -28,10 +29,17 @@ class NoFlight(RuntimeError):
 
     @classmethod
     def seen_by(cls, node: Node, complaint: str) -> NoFlight:
-        """Return the error of a client `node` for a complaint, as "no service /mission/start"."""
+        """Return the error of a client `node` for a complaint, as "no service /mission/start".
+
+        It names the flights that run on this computer: they may be in another domain.
+        """
+        found = "; ".join(
+            f"--instance {one.instance}: domain {one.domain}, {one.namespace}" for one in flights()
+        )
         return cls(
             f"{complaint} in ROS domain {node.context.get_domain_id()}: "
             "start a flight, or choose it by --instance, --namespace or ROS_DOMAIN_ID"
+            + (f" (running: {found})" if found else "")
         )
 
 
