@@ -5,8 +5,8 @@
     .venv/bin/python benchmarks/direct_engine.py --profile    # the slowest functions, too
 
 Alternates a part of the flight with the same number of `mj_step` of the same model, so that both
-run under the same load. Prints the real-time factor, the ratio, and a table of the parts of a tick.
-Times are CPU times of this process, on one core.
+run under the same load. Prints the real-time factor, the ratio, and a table: where the time goes,
+per tick of the flight. Times are CPU times of this process, on one core.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ import mujoco
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.flight.direct.warm_up import prepare_direct
 from uam_sim_bridge.plant import Vehicle
 
 STRETCH = 250  # ticks
 PHYSICS, REST = "bare mj_step", "between the parts"
-PLANT = "physics, rotors, servos"
+STEADY, OBJECTS = "steady ticks beside mj_step", "ticks of the objects beside mj_step"
+IN, BACK, GRASP = "copied in", "copied back", "executive of the grasps"
 
 
 def new_flight() -> DirectFlight:
@@ -51,13 +52,11 @@ def measure(watch: Callable[[DirectFlight], None] = lambda flight: None) -> tupl
     steps = round(bare.plant.period / model.opt.timestep)
     flown = physics = 0.0
     while not flight.mission.output.done:
-        before = time.process_time()
-        ticks = 0
-        while ticks < STRETCH and not flight.mission.output.done:
-            flight.tick()
-            ticks += 1
+        before, begun = time.process_time(), flight.plant.tick
+        while flight.plant.tick < begun + STRETCH and not flight.mission.output.done:
+            flight.advance(STRETCH, STRETCH)
         between = time.process_time()
-        for _ in range(ticks * steps):
+        for _ in range((flight.plant.tick - begun) * steps):
             mujoco.mj_step(model, data)
         flown += between - before
         physics += time.process_time() - between
@@ -84,19 +83,34 @@ class Watch:
 
     def __call__(self, flight: DirectFlight) -> None:
         """Watch a flight that begins."""
-        control = flight.control
-        control.stages[:] = [(name, self._timed(name, run)) for name, run in control.stages]
+        steady = flight.steady
+        self.ticks = 0  # that were steady
         for name, owner, method in (
-            ("sensors, truth", flight.plant, "observe"),
-            (PLANT, flight.plant, "step"),
-            ("autopilot", flight.autopilot, "update"),
-            ("recording", flight.recorder, "write"),
+            (IN, steady, "_load"),
+            (BACK, steady, "_store"),
+            (GRASP, steady._reference, "watch"),
+            (OBJECTS, flight, "tick"),
+            (OBJECTS, flight, "finish"),
         ):
             setattr(owner, method, self._timed(name, getattr(owner, method)))
+        present = steady._present
+
+        def watched() -> Callable:
+            loop = self._timed(STEADY, present())
+
+            def counted(*arguments: int) -> tuple[int, int]:
+                done, end = loop(*arguments)
+                self.ticks += done
+                return done, end
+
+            return counted
+
+        steady._present = watched
 
     def _timed(self, name: str, run: Callable) -> Callable:
         times, calls, clock = self.times, self.calls, time.process_time
-        times[name], calls[name] = 0.0, 0
+        times.setdefault(name, 0.0)
+        calls.setdefault(name, 0)
 
         def timed(*arguments: Any) -> Any:
             begin = clock()
@@ -115,22 +129,22 @@ class Watch:
 
 
 def parts() -> dict[str, float]:
-    """Return the time [us] of each part of a tick, the longest first.
-
-    The physics is apart from what the plant computes around it.
-    """
+    """Return where the time goes [us per tick], the longest first."""
     watch = Watch()
     flown, physics, _, ticks = measure(watch)
     times = watch.of_the_flight(flown)
-    times["rotors, servos, air"] = times.pop(PLANT) - physics
+    share = watch.ticks / ticks
+    times[STEADY] -= share * physics
+    times[OBJECTS] -= (1.0 - share) * physics
     shown = {name: 1e6 * seconds / ticks for name, seconds in times.items()}
+    print(f"{share:.1%} of the ticks are steady, in {watch.calls[STEADY]} calls\n")
     return {PHYSICS: 1e6 * physics / ticks} | dict(sorted(shown.items(), key=lambda one: -one[1]))
 
 
 def table(found: dict[str, float]) -> str:
     """Return the parts as a table."""
     total = sum(found.values())
-    lines = ["| part of a tick | us | |", "|---|---|---|"]
+    lines = ["| part | us per tick | |", "|---|---|---|"]
     lines += [f"| {name} | {us:.1f} | {us / total:.0%} |" for name, us in found.items()]
     return "\n".join([*lines, f"| all | {total:.1f} | |"])
 
@@ -161,7 +175,7 @@ def main() -> None:
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    prepare(print)
+    prepare_direct(print)
     flown, physics, simulated, _ = min(measure() for _ in range(options.runs))
     print(f"flight          {flown:.2f} s for {simulated:.1f} s, {simulated / flown:.0f} x real")
     print(f"bare mj_step    {physics:.2f} s, {simulated / physics:.0f} x real")

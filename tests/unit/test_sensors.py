@@ -13,10 +13,10 @@ from uam_sim_bridge.plant.sensors import (
     Imu,
     Mocap,
     Noise,
+    SampleRows,
     disturbed,
     generators,
     quantised,
-    sample_rows,
 )
 
 
@@ -137,8 +137,8 @@ def test_mocap_of_a_plant_that_begins_later_keeps_its_rate_from_there():
 
 def test_rows_of_samples_go_with_the_sequence_of_the_noise():
     ticks = 600
-    rows = sample_rows(Noise(np.random.default_rng(3), np.ones(6)), 2)
-    taken = [next(rows) for _ in range(ticks)]
+    rows = SampleRows(Noise(np.random.default_rng(3), np.ones(6)), 2)
+    taken = [rows() for _ in range(ticks)]
     noise = np.array([one[0] for one in taken])
     np.testing.assert_array_equal(noise, np.random.default_rng(3).standard_normal((ticks, 6)))
     _, row, *parts = taken[-1]

@@ -285,11 +285,15 @@ class AttitudeController(TorqueController):
 
         It counts with `prediction_measured`.
         """
-        p, self._measured = self.parameters, loop_delay
-        self._ahead = p.prediction
-        if p.prediction_measured and math.isfinite(loop_delay):
-            beyond = max(0.0, loop_delay - p.prediction_nominal)
-            self._ahead = min(LONGEST_PREDICTION, p.prediction + beyond)
+        self._measured, self._ahead = loop_delay, self.ahead(loop_delay)
+
+    def ahead(self, loop_delay: float) -> float:
+        """Return the time [s] by which errors are predicted with a measured `loop_delay` [s]."""
+        p = self.parameters
+        if not (p.prediction_measured and math.isfinite(loop_delay)):
+            return p.prediction
+        beyond = max(0.0, loop_delay - p.prediction_nominal)
+        return min(LONGEST_PREDICTION, p.prediction + beyond)
 
     def _begin(
         self,

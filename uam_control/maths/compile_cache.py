@@ -42,6 +42,11 @@ class CompileCache(FunctionCache):
         super().__init__(function)
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, function)
 
+    def _index_key(self, signature: Any, codegen: Any) -> Any:
+        """Return the key of a signature; numba's contains a number of the process for a function
+        that is defined in another one. What it has from there is in the digest of the sources."""
+        return signature, codegen.magic_tuple()
+
     @property
     def filled(self) -> bool:
         """Whether the cache contains machine code of the present sources, for any signature."""
@@ -53,6 +58,9 @@ class _Files(IndexDataCacheFile):
 
     def __init__(self, folder: str, base: str, function: Callable):
         super().__init__(folder, base, None)
+        given = [name for name, _ in _given(function)]
+        if given:  # the same source with other functions is another function
+            base += "-" + hashlib.sha256(repr(given).encode()).hexdigest()[:8]
         self._base, self._function = base, function
         # read the source now: at the first call it may already be edited
         _content(Path(function.__code__.co_filename))
@@ -109,6 +117,10 @@ def _parts(function: Callable, seen: set[Callable]) -> Iterator[Path | str]:
     seen.add(function)
     yield Path(function.__code__.co_filename)
     names = function.__code__.co_names
+    for name, inner in _given(function):
+        yield name
+        if inner is not None and inner not in seen:
+            yield from _parts(inner, seen)
     for name in names:
         value = function.__globals__.get(name)
         values = [value]
@@ -120,3 +132,19 @@ def _parts(function: Callable, seen: set[Callable]) -> Iterator[Path | str]:
                     yield from _parts(value.py_func, seen)
             elif isinstance(value, (int, float, str, tuple, slice)):
                 yield f"{name}={value!r}"
+
+
+def _given(function: Callable) -> Iterator[tuple[str, Callable | None]]:
+    """Yield what a function has from the function that defines it: names, and the functions.
+
+    They are compiled functions, and types of numba.
+    """
+    cells = function.__closure__ or ()
+    for name, cell in zip(function.__code__.co_freevars, cells, strict=True):
+        value = cell.cell_contents
+        if isinstance(value, types.Type):
+            yield f"{name}={value}", None
+        else:
+            inner = value.py_func
+            deeper = [one for one, _ in _given(inner)]
+            yield f"{name}={inner.__module__}.{inner.__qualname__}{deeper}", inner

@@ -31,10 +31,36 @@ def jit(function: F) -> F:
     if numba is None:
         return function
     # the wrapper for callers in C is not used here; without it, compiling takes 6 % less
-    compiled = numba.njit(no_cfunc_wrapper=True)(function)
+    # _nrt: not as in a caller under `borrowing`
+    compiled = numba.njit(no_cfunc_wrapper=True, _nrt=True)(function)
     if active():
         compiled._cache = CompileCache(function)
     return compiled
+
+
+def borrowing(function: F) -> F:
+    """Return `function`, compiled as by `jit`, without counting references to arrays.
+
+    For functions that pass many arrays on: counting takes longer than most of what they call. They
+    use the arrays of their arguments. They allocate none, and call none that returns one, as
+    nobody would free it.
+    """
+    if numba is None:
+        return function
+    compiled = numba.njit(no_cfunc_wrapper=True, _nrt=False)(function)
+    if active():
+        compiled._cache = CompileCache(function)
+    return compiled
+
+
+def inlined(function: F) -> F:
+    """Return `function`, compiled as a part of each function that calls it, see `borrowing`."""
+    return function if numba is None else numba.njit(inline="always", _nrt=False)(function)
+
+
+def counts_references(function: Callable) -> bool:
+    """Return whether a function under `borrowing` may call this one: it is under `jit`."""
+    return not active() or bool(getattr(function, "targetoptions", {}).get("_nrt"))
 
 
 def prepared(function: F, *arguments: object) -> F:

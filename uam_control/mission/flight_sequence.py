@@ -50,7 +50,7 @@ from uam_control.supervision import (
 from uam_control.vehicle import VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
-_OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
+OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
 class Mission:
@@ -208,7 +208,7 @@ class Mission:
         for the companion.
         """
         output, guidance = self.output, self._guidance
-        self._age, self._stamp = min(max(stamp - self._stamp, 0.0), _OLDEST), stamp
+        self._age, self._stamp = min(max(stamp - self._stamp, 0.0), OLDEST), stamp
         if guidance is not None:
             output.time = stamp - self._takeoff
         if output.state is not State.DISARMED:
@@ -234,7 +234,7 @@ class Mission:
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
             self._follow(stamp, decision)
-            self._watch_payload(stamp, seen)
+            self.watch_payload()
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state, armed_since is not None)
             elif output.state is State.GROUNDED and armed_since is None:
@@ -373,9 +373,9 @@ class Mission:
         seen.overdue = time > late or stamp > guidance.end + p.touchdown_timeout
         return seen
 
-    def _watch_payload(self, stamp: float, seen: Observation) -> None:
-        """Step the executive of the grasps while the scenario is flown."""
-        output, watch = self.output, self._watch
+    def watch_payload(self) -> None:
+        """Step the executive of the grasps while the scenario is flown; the end of a `step`."""
+        output, watch, stamp, seen = self.output, self._watch, self._stamp, self._seen
         if watch is None or self._parameters.grasp_checks == "off":
             return
         if output.state is not State.FLYING or self._guidance.planned:

@@ -118,12 +118,16 @@ class EstimatorStage:
                 return None
             state = estimator.update()
         if not self._believable(state):
-            self.diverged += 1
-            self._held_until = tick + HELD_BACK
-            self.estimator = StateEstimator(estimator.parameters, self._joint_count)
-            self._waiting = True
+            self.diverge(tick)
             return None
         return None if tick < self._held_until else state
+
+    def diverge(self, tick: int) -> None:
+        """Begin the estimate anew: that of the tick `tick` [ns] is not believable."""
+        self.diverged += 1
+        self._held_until = tick + HELD_BACK
+        self.estimator = StateEstimator(self.estimator.parameters, self._joint_count)
+        self._waiting = True
 
 
 @jit

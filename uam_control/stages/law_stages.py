@@ -19,22 +19,23 @@ class MeasuredDelay:
     """The loop delay that the bridge reports, for the attitude law of a later tick.
 
     A report is used when it has arrived in every engine, REPORT_DELAY after its stamp.
+    `reports`: those that have not, the stamp [ns] and the loop delay [s] of each.
     """
 
     def __init__(self, controller: AttitudeController) -> None:
         self._controller = controller
-        self._reports: deque[tuple[int, float]] = deque()
+        self.reports: deque[tuple[int, float]] = deque()
 
     def report(self, stamp: int, loop_delay: float | None) -> None:
         """Take the report of the tick `stamp` [ns]; loop_delay [s], None: unknown."""
-        if self._reports and stamp < self._reports[-1][0]:  # a new simulation
-            self._reports.clear()
-        self._reports.append((stamp, math.nan if loop_delay is None else loop_delay))
+        if self.reports and stamp < self.reports[-1][0]:  # a new simulation
+            self.reports.clear()
+        self.reports.append((stamp, math.nan if loop_delay is None else loop_delay))
 
     def apply(self, stamp: int) -> None:
         """Give the controller the newest report that has arrived at the tick `stamp` [ns]."""
-        while self._reports and self._reports[0][0] <= stamp - REPORT_DELAY:
-            self._controller.measured(self._reports.popleft()[1])
+        while self.reports and self.reports[0][0] <= stamp - REPORT_DELAY:
+            self._controller.measured(self.reports.popleft()[1])
 
 
 class LawStage:

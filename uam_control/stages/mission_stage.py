@@ -65,11 +65,7 @@ class MissionStage:
         """
         if stamp < self.ahead - NEW_TIME:
             self._begin_anew()
-        while self._reports and self._reports[0][0] < stamp:
-            reported, connected, since, delays, self._authority = self._reports.popleft()
-            self._armed_since = None if since is None else since / SECOND
-            if connected:
-                self.inputs.inputs.autopilot(reported / SECOND, *delays)
+        self.take_reports(stamp)
         self._readings = self.inputs.tick(stamp)
         last, self._last = self._last, stamp
         anew = stamp != self.ahead and not serves(self.ahead, last, stamp, self.period)
@@ -79,6 +75,14 @@ class MissionStage:
         self.reference = carried(output.reference, step) if step else output.reference
         self.time = output.time + step / SECOND if output.time >= 0.0 else output.time
         return anew
+
+    def take_reports(self, stamp: int) -> None:
+        """Use the bridge's reports of the ticks before `stamp` [ns]."""
+        while self._reports and self._reports[0][0] < stamp:
+            reported, connected, since, delays, self._authority = self._reports.popleft()
+            self._armed_since = None if since is None else since / SECOND
+            if connected:
+                self.inputs.inputs.autopilot(reported / SECOND, *delays)
 
     def _begin_anew(self) -> None:
         """Forget the flight: stamps went back, the simulation is a new one."""

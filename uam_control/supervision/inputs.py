@@ -36,8 +36,8 @@ class Inputs:
         self._payload = math.nan  # stamp [s]
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()
-        # stamps [s] of first and newest bias, mean (3,) [m/s^2]
-        self._bias: tuple[float, float, list[float]] | None = None
+        self._bias: tuple[float, float] | None = None  # stamps [s] of the first and the newest
+        self._bias_mean = np.zeros(3)  # [m/s^2]
         self._temperatures: dict[str, float] = {}
         self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
         self._of_pose: dict[str, float] = {}
@@ -73,12 +73,11 @@ class Inputs:
         A real bias changes slowly. The estimate changes fast where motion capture and IMU
         contradict each other: exchanged axes, a wrong body.
         """
-        now = bias.tolist()  # three floats: numpy takes longer
-        first, last, mean = self._bias or (stamp, stamp, now)
-        step, memory = max(stamp - last, 0.0), min(max(stamp - first, 1e-3), BIAS_MEMORY)
-        gain = min(step / memory, 1.0)
-        self._bias = first, stamp, [m + gain * (b - m) for m, b in zip(mean, now, strict=True)]
-        self._readings.contradiction = math.dist(now, mean)
+        if self._bias is None:
+            self._bias, self._bias_mean[:] = (stamp, stamp), bias
+        first, last = self._bias
+        self._bias = first, stamp
+        self._readings.contradiction = follow_bias(stamp, first, last, bias, self._bias_mean)
 
     def lift(self, thrust: float) -> None:
         """Store the filtered collective thrust [N]."""
@@ -146,6 +145,24 @@ class Inputs:
         readings.controller_age = stamp - self._oldest
         readings.pose_controller_age = stamp - self._oldest_of_pose
         return readings
+
+
+@jit
+def follow_bias(
+    stamp: float, first: float, last: float, bias: np.ndarray, mean: np.ndarray
+) -> float:
+    """Return the distance [m/s^2] of a bias (3,) from the mean (3,), which then follows it.
+
+    stamp, first, last [s]: of this bias, of the first and of the one before.
+    """
+    step, memory = max(stamp - last, 0.0), min(max(stamp - first, 1e-3), BIAS_MEMORY)
+    gain = min(step / memory, 1.0)
+    squared = 0.0
+    for i in range(3):
+        away = bias[i] - mean[i]
+        squared += away * away
+        mean[i] += gain * away
+    return math.sqrt(squared)
 
 
 @jit

@@ -16,7 +16,7 @@ from typing import Any
 from uam_control.settings import configuration
 from uam_lab.campaign.carried import arrived, carried
 from uam_lab.campaign.trial import Trial, measure
-from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.flight.direct.warm_up import prepare_direct
 from uam_lab.results.atomic import replacing
 from uam_lab.results.row_table import RowTable
 from uam_lab.workers.place import Workplace
@@ -127,8 +127,8 @@ def _flown_by_workers(
             yield _Errand(work, trial)
 
     if not place.scheduler:
-        prepare()  # here once, not in every worker
-    with workers(place, prepare, partial(print, flush=True)) as crew:
+        prepare_direct()  # here once, not in every worker
+    with workers(place, prepare_direct, partial(print, flush=True)) as crew:
         for k, (result, content) in crew.completed(_run, errands()):
             number = numbers[k]
             if number in keep:

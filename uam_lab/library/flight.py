@@ -20,7 +20,7 @@ from uam_control.supervision import State
 from uam_control.supervision.preflight import UNKNOWN
 from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import conclude
-from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.flight.direct.warm_up import prepare, prepare_direct
 from uam_lab.flight.flight_settings import FlightSettings, SettingsError
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.library.errors import CommandRefused, FlightEnded, FlightError, NotInTime
@@ -114,7 +114,8 @@ class Flight:
             raise FlightError("a Flight flies once: make another one")
         if self.settings.engine == "ros":
             flight_settings.require_ros()
-        prepare(self._history.message)
+        make_ready = prepare if self.settings.engine == "ros" else prepare_direct
+        make_ready(self._history.message)
         settings = self.settings
         self._folder = ResultFolder.create(
             settings.scenario.name, settings.controller, settings.out

@@ -22,7 +22,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from uam_lab.campaign.trial import measure
-from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.flight.direct.warm_up import prepare_direct
 from uam_lab.tuning.convergence import SMALL, improvement
 from uam_lab.tuning.front import delay_margin, hypervolumes
 from uam_lab.tuning.space import Space, TuningError
@@ -196,8 +196,8 @@ def search(
         progress(_done(study), _progress(study))
 
     if not finished(study, task):
-        prepare()
-        with workers(place, prepare, partial(print, flush=True)) as crew:
+        prepare_direct()
+        with workers(place, prepare_direct, partial(print, flush=True)) as crew:
             for _ in crew.completed(work, tasks, per_worker=1, idle=show):
                 show()
     show()

@@ -24,7 +24,7 @@ from uam_sim_bridge.plant.physics import (
     step_period,
 )
 from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators, sample_rows
+from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, SampleRows, generators
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
 STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's solimp
@@ -60,7 +60,7 @@ class MujocoPlant(Plant):
         self._tracks_payload = sensors["mocap"].get("payload", False)
         self._payload_mocap = Mocap(sensors["mocap"], scale, payload_noise)
         self._encoders = Encoders(sensors["joints"])
-        self._rows = sample_rows(self._imu.noise, self.joints)
+        self._rows = SampleRows(self._imu.noise, self.joints)
         self._imu_delay, self._mocap_delay, self._joints_delay, self._payload_delay = (
             Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints", "mocap")
         )
@@ -239,7 +239,7 @@ class MujocoPlant(Plant):
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`."""
         tick, time = self.tick, self.tick * self.period
-        noise, samples, gyro, force, angles, speeds, torques = next(self._rows)
+        noise, samples, gyro, force, angles, speeds, torques = self._rows()
         self._observe(self._observed, noise, samples, self._magnet_gain, self.truth_row, row)
         effects = self._effects
         if effects is not None:

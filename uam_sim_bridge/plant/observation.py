@@ -51,7 +51,7 @@ def observe(
     at: TruthRow,
     truth: np.ndarray,
 ) -> None:
-    """Write the samples of IMU and joints, see `sample_rows`, and the true values of a tick.
+    """Write the samples of IMU and joints, see `SampleRows`, and the true values of a tick.
 
     noise (6,): of the IMU; samples (6 + 3 n,); magnet_gain, at, truth: of `write_truth`.
     """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -15,32 +14,38 @@ BLOCK = 256  # noise samples drawn per call of the generator; the sequence is th
 
 
 class Noise:
-    """White noise with given standard deviations (width,), drawn in blocks; (width,) per call."""
+    """White noise with given standard deviations (width,), drawn in blocks; (width,) per call.
+
+    `rows` (BLOCK, width): the present block; `used`: how many of them were returned.
+    """
 
     def __init__(self, generator: np.random.Generator, deviations: np.ndarray) -> None:
         self._generator = generator
         self._deviations = deviations
-        self._rows = iter(())
+        self.rows = np.empty((BLOCK, len(deviations)))
+        self.used = BLOCK
 
     def __call__(self) -> np.ndarray:
-        row = next(self._rows, None)
-        if row is None:
-            self._rows = iter(self.block())
-            row = next(self._rows)
+        self.draw()
+        row = self.rows[self.used]
+        self.used += 1
         return row
 
-    def block(self) -> np.ndarray:
-        """Return the next BLOCK rows (BLOCK, width); not to be mixed with single rows."""
-        shape = (BLOCK, len(self._deviations))
-        return self._generator.standard_normal(shape) * self._deviations
+    def draw(self) -> bool:
+        """Draw the next block if the present one is used up; return whether it was."""
+        if self.used < BLOCK:
+            return False
+        self.rows = self._generator.standard_normal(self.rows.shape) * self._deviations
+        self.used = 0
+        return True
 
 
 class Delay:
     """Delay line of a number of ticks. No sample overtakes another."""
 
     def __init__(self, ticks: int) -> None:
-        self._ticks = ticks
-        self._queue: deque = deque()
+        self.ticks = ticks
+        self.queue: deque[tuple[int, tuple]] = deque()  # tick at which it is due, sample
 
     def __call__(self, tick: int, sample: tuple | None, added: int = 0) -> tuple | None:
         """Store the sample taken at `tick`, if any; return the sample due by then, or None.
@@ -48,9 +53,9 @@ class Delay:
         added: ticks by which this sample is later than usual.
         """
         if sample is not None:
-            self._queue.append((tick + self._ticks + added, sample))
-        if self._queue and self._queue[0][0] <= tick:
-            return self._queue.popleft()[1]
+            self.queue.append((tick + self.ticks + added, sample))
+        if self.queue and self.queue[0][0] <= tick:
+            return self.queue.popleft()[1]
         return None
 
 
@@ -75,26 +80,26 @@ class Mocap:
 
     def __init__(self, numbers: dict, scale: float, generator: np.random.Generator) -> None:
         """numbers: `sensors.mocap` of the vehicle; scale: factor on noise."""
-        self._period = 1.0 / numbers["rate"]
-        self._next = 0.0
+        self.period = 1.0 / numbers["rate"]
+        self.next = 0.0  # [s] of the next pose
         deviations = [numbers["position_noise"]] * 3 + [numbers["attitude_noise"]] * 3
-        self._noise = Noise(generator, scale * np.array(deviations))
+        self.noise = Noise(generator, scale * np.array(deviations))
         any_length = np.empty(3)
         self._noisy = prepared(noisy_pose, *(any_length,) * 5)
 
     def due(self, time: float) -> bool:
         """Return whether mocap takes a pose at `time` [s]; call it once per tick."""
-        if time + 1e-9 < self._next:
+        if time + 1e-9 < self.next:
             return False
-        if time > self._next + self._period:  # the first tick of a plant that begins later
-            self._next = time
-        self._next += self._period
+        if time > self.next + self.period:  # the first tick of a plant that begins later
+            self.next = time
+        self.next += self.period
         return True
 
     def sample(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, with noise."""
         place, attitude = np.empty(3), np.empty(4)
-        self._noisy(position, quaternion, self._noise(), place, attitude)
+        self._noisy(position, quaternion, self.noise(), place, attitude)
         return place, attitude
 
 
@@ -106,19 +111,28 @@ class Encoders:
         self.units = np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
 
 
-def sample_rows(noise: Noise, joints: int) -> Iterator[tuple[np.ndarray, ...]]:
-    """Yield for each tick: noise of the IMU (6,), row of its samples (6 + 3 n,), and its parts.
+class SampleRows:
+    """For each tick: noise of the IMU (6,), row of its samples (6 + 3 n,), and its parts.
 
     The parts are views: gyro, specific force (3,), angles, velocities, torques (n,). A row is
-    written once and never again: whoever has a sample may keep it. noise: of `Imu`.
+    written once and never again: whoever has a sample may keep it.
     """
-    edges = np.cumsum([0, 3, 3, joints, joints, joints])
-    while True:
-        drawn = noise.block()
-        rows = np.empty((len(drawn), edges[-1]))
-        yield from zip(
-            drawn, rows, *(rows[:, a:b] for a, b in pairwise(edges)), strict=True
-        )  # as views
+
+    def __init__(self, noise: Noise, joints: int) -> None:
+        """noise: of `Imu`."""
+        self._noise, self._edges = noise, np.cumsum([0, 3, 3, joints, joints, joints])
+        self._block: np.ndarray | None = None  # of the noise, to which the parts belong
+        self._parts: list[tuple[np.ndarray, ...]] = []
+
+    def __call__(self) -> tuple[np.ndarray, ...]:
+        noise = self._noise
+        noise.draw()
+        if self._block is not noise.rows:
+            rows = np.empty((BLOCK, self._edges[-1]))
+            views = (rows[:, a:b] for a, b in pairwise(self._edges))
+            self._block, self._parts = noise.rows, list(zip(noise.rows, rows, *views, strict=True))
+        noise.used += 1
+        return self._parts[noise.used - 1]
 
 
 @jit

@@ -24,6 +24,7 @@ from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint
+from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 from uam_sim_bridge.stages.bridge_stage import BridgeStage
 
 Pose = tuple[int, np.ndarray, np.ndarray]  # stamp [ns], position (3,) [m], quaternion [w x y z]
@@ -130,7 +131,11 @@ class ControlTick:
         signals = self.signals
         signals.mocap, signals.joints, signals.imu = mocap, joints, imu
         signals.payload = payload
-        for _, stage in self.stages:
+        return self.go_on(0)
+
+    def go_on(self, first: int) -> bool:
+        """Run the stages from number `first` on; return whether the last one was reached."""
+        for _, stage in self.stages[first:]:
             if not stage(self):
                 return False
         return True
@@ -239,17 +244,23 @@ def send_setpoint(tick: ControlTick) -> bool:
         inputs = tick.mission.inputs
         inputs.keep("lift", inputs.inputs.lift, (bridge.lift,), s.stamp)
     if report is not None:
-        authority = Authority(report.released_to, report.landed, report.mode.lands)
-        tick.mission.autopilot(
-            s.stamp,
-            report.connected,
-            report.armed_since,
-            report.round_trip,
-            report.loop_delay,
-            authority,
-        )
-        tick.measured_delay.report(s.stamp, report.loop_delay)
+        take_report(tick, report)
     return True
+
+
+def take_report(tick: ControlTick, report: AutopilotReport) -> None:
+    """Give the bridge's report of the present tick to mission and attitude law."""
+    stamp = tick.signals.stamp
+    authority = Authority(report.released_to, report.landed, report.mode.lands)
+    tick.mission.autopilot(
+        stamp,
+        report.connected,
+        report.armed_since,
+        report.round_trip,
+        report.loop_delay,
+        authority,
+    )
+    tick.measured_delay.report(stamp, report.loop_delay)
 
 
 def look_ahead(tick: ControlTick) -> bool:

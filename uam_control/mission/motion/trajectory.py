@@ -74,8 +74,12 @@ class Moves:
     def rows(self, times: np.ndarray, count: int = MOTION_ROWS) -> np.ndarray:
         """Return the first `count` rows of the motions (count, m, 6 + n) at times (m,) [s]."""
         motions = np.empty((len(times), MOTION_ROWS, len(self._start)))
-        _write_all(times, self._start, self._first, self._rows, motions)
+        self.write_rows(times, motions)
         return motions.swapaxes(0, 1)[:count]
+
+    def write_rows(self, times: np.ndarray, motions: np.ndarray) -> None:
+        """Write the motions (m, 5, 6 + n) at mission times (m,) [s]."""
+        _write_all(times, self._start, self._first, self._rows, motions)
 
 
 def check_rows(motion: np.ndarray) -> None:

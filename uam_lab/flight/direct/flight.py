@@ -1,13 +1,16 @@
 """The direct engine: the objects of the nodes in one loop, without middleware and sockets.
 
 One pass of the loop is one control tick, in the order of a lockstep flight with ROS: sensors, the
-stages of `ControlTick`, autopilot, physics.
+stages of `ControlTick`, autopilot, physics. Most passes are steady ticks, see `steady`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
@@ -15,6 +18,7 @@ from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flight.direct.record import TickRecorder
+from uam_lab.flight.direct.steady.places import AUTOPILOT, DIVERGE
 from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -29,6 +33,9 @@ from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.control_tick import ControlTick, Imu, Joints, Pose
+
+if TYPE_CHECKING:
+    from uam_lab.flight.direct.steady.ticks import SteadyTicks
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 
@@ -52,7 +59,7 @@ class DirectFlight:
     ) -> None:
         """payload_mass [kg]; faults: those that `faults.feasibility.check` lets pass; plant: see
         `plant_class`; autopilot_imu: the estimator has the autopilot's IMU, a tick late."""
-        self._autopilot_imu = autopilot_imu
+        self.autopilot_imu = autopilot_imu
         sets = profile.sets
         vehicle = vehicle.changed(servo_mode(profile))
         started = (vehicle, payload_mass, seed, scenario.arm_start)
@@ -95,12 +102,14 @@ class DirectFlight:
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not output.done:
+            second = plant.tick // ticks_a_second
+            left = int((self._limit - plant.time) / plant.period)
             try:
-                self.tick()
+                self.advance((second + 1) * ticks_a_second - plant.tick, left)
             except PhysicsError as error:
                 self.ended_by = str(error)
                 break
-            if plant.tick % ticks_a_second == 0:
+            if plant.tick // ticks_a_second > second:
                 if progress is not None:
                     progress(output.time, output.phase)
                 if settled.over(plant.time, self.armed):
@@ -131,19 +140,56 @@ class DirectFlight:
         """The injected faults; see `faults.timeline.record`."""
         return self._faults.records if self._faults else []
 
+    @cached_property
+    def steady(self) -> SteadyTicks:
+        """The steady ticks of this flight."""
+        # here: a flight with nodes imports this module, and compiles none of it
+        from uam_lab.flight.direct.steady.ticks import SteadyTicks
+
+        return SteadyTicks(self)
+
+    def advance(self, enough: int, most: int) -> None:
+        """Fly at least one tick, and until `enough` are flown; at most `most`, which is not less.
+
+        After `enough` it ends where it costs no time. Raises PhysicsError.
+        """
+        if not self.steady.fly(min(enough, most), most):
+            self.tick()
+
     def tick(self) -> None:
         """One control period of the whole vehicle."""
-        plant, control, autopilot = self.plant, self.control, self.autopilot
-        signals, recorder = control.signals, self.recorder
-        now, magnet = plant.time, signals.magnet
-        samples = plant.observe(recorder.truth())
-        autopilot.time = now
-        if control.tick(*self._delivered(samples)):
-            recorder.write(now, autopilot.motors, magnet, signals, control.bridge.sent)
+        plant, control = self.plant, self.control
+        now, magnet = plant.time, control.signals.magnet
+        samples = plant.observe(self.recorder.truth())
+        self.autopilot.time = now
+        self._record(now, magnet, control.tick(*self._delivered(samples)))
+        self._end_tick(samples.hil)
+
+    def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
+        """Finish a tick that steady ticks have begun; stage: the first one that is left.
+
+        See `steady.places`; hil: as in `Samples`.
+        """
+        control, now, magnet = self.control, self.plant.time, self.control.signals.magnet
+        if stage == DIVERGE:
+            control.estimator.diverge(control.estimator.stamp)
+            self._record(now, magnet, False)
+        elif stage < AUTOPILOT:
+            self._record(now, magnet, control.go_on(stage))
+        self._end_tick(hil)
+
+    def _record(self, now: float, magnet: bool, whole: bool) -> None:
+        """Record the tick of `now` [s]; magnet: in force at its begin; whole: see `write`."""
+        control, motors, recorder = self.control, self.autopilot.motors, self.recorder
+        if whole:
+            recorder.write(now, motors, magnet, control.signals, control.bridge.sent)
         else:
-            recorder.write_blind(now, autopilot.motors, magnet, self.mission.output.phase)
-        motors = autopilot.update(*samples.hil)
-        plant.step(motors, signals.arm_command, signals.magnet)
+            recorder.write_blind(now, motors, magnet, self.mission.output.phase)
+
+    def _end_tick(self, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
+        signals = self.control.signals
+        motors = self.autopilot.update(*hil)
+        self.plant.step(motors, signals.arm_command, signals.magnet)
 
     def _delivered(
         self, samples: Samples
@@ -153,7 +199,7 @@ class DirectFlight:
         As the plant's node does, nothing is delivered before every kind of sensor has.
         """
         mocap, joints, payload = samples.mocap, samples.joints, samples.payload
-        imu = self.autopilot.imu() if self._autopilot_imu else samples.imu
+        imu = self.autopilot.imu() if self.autopilot_imu else samples.imu
         if not self._complete:
             self._complete = None not in (mocap, joints, imu)
             for sample in filter(None, (mocap, joints, imu, samples.hil)):

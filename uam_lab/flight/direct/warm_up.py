@@ -17,6 +17,7 @@ from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
+from uam_control.maths.compiled import active
 from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
@@ -29,6 +30,7 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
+STEADY = "uam_lab.flight.direct.steady."  # modules that only a direct flight imports
 STAND_IN = "--stand-in"  # option of this module as a program
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
@@ -45,7 +47,11 @@ def compiled_functions() -> Iterator:
 
 def is_cold() -> bool:
     """Return whether a function of the control path is not compiled from its present source."""
-    return not all(function._cache.filled for function in compiled_functions())
+    return not all(
+        function._cache.filled
+        for function in compiled_functions()
+        if not function.py_func.__module__.startswith(STEADY)  # see `prepare_direct`
+    )
 
 
 def prepare(say: Callable[[str], None] = lambda text: None) -> None:
@@ -61,6 +67,36 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
                 beside.terminate()
                 raise
         warm_up(law for law in LAWS if law != catalogue.DEFAULT)
+
+
+def prepare_direct(
+    say: Callable[[str], None] = lambda text: None, laws: Iterable[str] = (catalogue.DEFAULT,)
+) -> None:
+    """Do what `prepare` does, and compile the steady ticks of the direct engine with `laws`."""
+    from uam_lab.flight.direct.steady.laws import control
+
+    prepare(say)
+    for law in laws:
+        if active() and not (
+            _filled(control((LAWS[law].step,) * 3)) and all(map(_filled, _steady()))
+        ):
+            say(f"compiling the direct engine with {law} (once)")
+            hover, vehicle = load_scenario("hover"), Vehicle.load()
+            flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
+            while flight.plant.tick < TICKS:
+                flight.advance(TICKS, TICKS)
+
+
+def _steady() -> Iterator:
+    """Yield the compiled functions of the steady ticks."""
+    import uam_lab.flight.direct.steady.ticks  # noqa: F401
+
+    yield from (one for one in compiled_functions() if one.py_func.__module__.startswith(STEADY))
+
+
+def _filled(function: Callable) -> bool:
+    """Return whether a function has machine code on disk; one that is inlined never has."""
+    return getattr(function._cache, "filled", True)
 
 
 def warm_up(laws: Iterable[str]) -> None:
@@ -109,4 +145,4 @@ if __name__ == "__main__":
     if STAND_IN in sys.argv:
         _stand_in()
     else:
-        prepare(print)
+        prepare_direct(print, LAWS)
