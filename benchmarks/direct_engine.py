@@ -84,7 +84,6 @@ class Watch:
     def __call__(self, flight: DirectFlight) -> None:
         """Watch a flight that begins."""
         steady = flight.steady
-        self.ticks = 0  # that were steady
         for name, owner, method in (
             (IN, steady, "_load"),
             (BACK, steady, "_store"),
@@ -94,18 +93,8 @@ class Watch:
         ):
             setattr(owner, method, self._timed(name, getattr(owner, method)))
         present = steady._present
-
-        def watched() -> Callable:
-            loop = self._timed(STEADY, present())
-
-            def counted(*arguments: int) -> tuple[int, int]:
-                done, end = loop(*arguments)
-                self.ticks += done
-                return done, end
-
-            return counted
-
-        steady._present = watched
+        steady._present = lambda: self._timed(STEADY, present())
+        self.steady = steady
 
     def _timed(self, name: str, run: Callable) -> Callable:
         times, calls, clock = self.times, self.calls, time.process_time
@@ -133,7 +122,7 @@ def parts() -> dict[str, float]:
     watch = Watch()
     flown, physics, _, ticks = measure(watch)
     times = watch.of_the_flight(flown)
-    share = watch.ticks / ticks
+    share = watch.steady.ticks / ticks
     times[STEADY] -= share * physics
     times[OBJECTS] -= (1.0 - share) * physics
     shown = {name: 1e6 * seconds / ticks for name, seconds in times.items()}

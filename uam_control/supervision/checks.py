@@ -151,8 +151,7 @@ class Checks:
             for check in CHECKS
         )
         first = [min(limits) for limits in self._limits]
-        calm = [limit - p.hysteresis * abs(limit) for limit in first]
-        parts = calm, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
+        parts = first, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
         self._bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
         self._bounds = self._bounds.astype(float)
         self._joints = len(p.joint_angle_hold)
@@ -234,8 +233,8 @@ def measure_all(
     """Write all quantities into values, in the order of CHECKS; return whether all are calm.
 
     state to ground: see `measure`; readings to gains: see `read`; link, loop: setpoint delays [s],
-    NaN if unknown. bounds: all limits in one array. Of every quantity the value below which no
-    monitor changes, unless a limit was exceeded before; low and high corner (3,) of the box [m];
+    NaN if unknown. bounds: all limits in one array. Of every quantity the lowest limit, below which
+    no monitor changes while all are quiet; low and high corner (3,) of the box [m];
     gains (3,) of position, attitude, arm; `joints` angles [rad]; torques [N m].
     """
     box, gain = _CHECKED, _CHECKED + 6

@@ -31,7 +31,7 @@ from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 STEADY = "uam_lab.flight.direct.steady."  # modules that only a direct flight imports
-STAND_IN = "--stand-in"  # option of this module as a program
+STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"  # options of this module as a program
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
@@ -145,4 +145,4 @@ if __name__ == "__main__":
     if STAND_IN in sys.argv:
         _stand_in()
     else:
-        prepare_direct(print, LAWS)
+        prepare_direct(print, LAWS if ALL_LAWS in sys.argv else [catalogue.DEFAULT])

@@ -122,10 +122,13 @@ ROW, FIRST, NEXT, SLOT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(9)
 
 
 class SteadyTicks:
-    """Flies the steady ticks of a `DirectFlight`."""
+    """Flies the steady ticks of a `DirectFlight`.
+
+    `able`: whether the flight may have any; `ticks`: how many it has had.
+    """
 
     def __init__(self, flight: DirectFlight) -> None:
-        self._flight = flight
+        self._flight, self.ticks = flight, 0
         stages, plant = flight.control, flight.plant
         self.able = type(plant) is MujocoPlant and stages.stages == list(STAGES)
         if not self.able:
@@ -168,6 +171,7 @@ class SteadyTicks:
             left = enough - flown, most - flown
             done, end = self._fly(count, begin, *left) if count >= 0 else (0, RECORD)
             flown += done
+            self.ticks += done
             if end == ERROR:
                 raise PhysicsError(f"MuJoCo: {error_text(self._counts.item(FAULT))}")
             begin = RECORD if end == WATCH else LISTEN

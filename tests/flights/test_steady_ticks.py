@@ -1,0 +1,240 @@
+"""Steady ticks: a flight in compiled loops is the flight of the objects, bit for bit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.supervision import OperatorCommand, State
+from uam_control.vehicle import load_description
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_sim_bridge.faults.schedule import read_schedule
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.plant import PhysicsError, Vehicle
+from uam_sim_bridge.plant.effects import presets
+
+GUSTS = {"wind": [1.0, 0.5, 0.0], "gust": 1.0}
+
+
+def flight(scenario="hover", law="modular", vehicle="s500_arm", payload=0.2, seed=1, **more):
+    """Return a flight; air: changes of the vehicle's; profile: names after that of the law."""
+    described = load_description(vehicle)
+    flown, profile = Vehicle.of(described), default_profile(law, described)
+    if air := more.pop("air", None):
+        flown = flown.changed({"air": {**flown.numbers["air"], **air}})
+    if further := more.pop("profile", None):
+        profile = load_profile("s500", further)
+    return DirectFlight(load_scenario(scenario, described), profile, flown, payload, seed, **more)
+
+
+def fly_objects(one, until):
+    """Fly to tick `until` by the objects alone."""
+    while one.plant.tick < until and not one.mission.output.done:
+        one.tick()
+
+
+def fly_steady(one, until):
+    """Fly to tick `until`, steady where it may be."""
+    while one.plant.tick < until and not one.mission.output.done:
+        one.advance(until - one.plant.tick, until - one.plant.tick)
+
+
+def assert_same(steady, objects):
+    """Assert that both have recorded and decided the same."""
+    found, expected = steady.recording, objects.recording
+    assert steady.plant.tick == objects.plant.tick
+    assert found.count == expected.count
+    assert found.phase_names == expected.phase_names
+    np.testing.assert_array_equal(found.phases[: found.count], expected.phases[: found.count])
+    rows, other = found.values[: found.count], expected.values[: found.count]
+    different = np.flatnonzero(np.any(rows.view(np.int64) != other.view(np.int64), axis=1))
+    if len(different):
+        row = different[0]
+        names = np.array(found.columns.names)[rows[row].view(np.int64) != other[row].view(np.int64)]
+        pytest.fail(f"row {row}, {rows[row, 0]:.3f} s: {', '.join(names[:5])}")
+    assert steady.mission.changes == objects.mission.changes
+    assert steady.mission.grasps == objects.mission.grasps
+    assert vars(steady.mission.output).keys() == vars(objects.mission.output).keys()
+
+
+END = 100_000  # ticks: later than any end
+
+
+@pytest.mark.parametrize(
+    ("options", "share"),
+    [
+        ({"scenario": "hover"}, 0.75),
+        ({"scenario": "circle"}, 0.85),  # a CSV file: no moves
+        ({"scenario": "quick_pick"}, 0.6),
+        ({"scenario": "quick_pick", "seed": 3, "air": GUSTS}, 0.4),  # the clock stops, shifts
+        ({"scenario": "hover", "law": "asmc1"}, 0.75),
+        ({"scenario": "hover", "law": "asmc2"}, 0.75),
+        ({"scenario": "hover", "vehicle": "hexa_arm"}, 0.75),
+        ({"scenario": "arm3_motions", "vehicle": "s500_arm3"}, 0.75),
+    ],
+    ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
+)
+def test_a_flight_is_recorded_the_same(options, share):
+    steady, objects = flight(**options), flight(**options)
+    steady.run()
+    fly_objects(objects, END)
+    assert_same(steady, objects)
+    assert steady.mission.output.phase == "landed"
+    assert steady.steady.ticks > share * steady.plant.tick
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    st.lists(st.tuples(st.booleans(), st.integers(1, 400)), min_size=3, max_size=12),
+    st.integers(1, 1000),
+)
+def test_it_may_change_between_both_at_any_tick(stretches, seed):
+    mixed, objects = flight(seed=seed), flight(seed=seed)
+    fly_objects(mixed, 600)  # in the air
+    for is_steady, ticks in stretches:
+        (fly_steady if is_steady else fly_objects)(mixed, mixed.plant.tick + ticks)
+    fly_objects(objects, mixed.plant.tick)
+    assert_same(mixed, objects)
+
+
+def late_poses(one):
+    """Move the next pose by a metre: the estimator refuses it."""
+    due, (stamp, position, quaternion) = one.plant._mocap_delay.queue.pop()
+    one.plant._mocap_delay.queue.append((due, (stamp, position + 1.0, quaternion)))
+
+
+def frozen_poses(one):
+    """Let all poses of a moment be the same: a frozen tracker."""
+    queue = one.plant._mocap_delay.queue
+    _, first = queue[0]
+    for i, (due, sample) in enumerate(list(queue)):
+        queue[i] = due, (sample[0], *first[1:])
+
+
+def broken_estimate(one):
+    """Let the estimate diverge."""
+    one.control.estimator.estimator._pose.velocity[0] = np.nan
+
+
+def storm(one):
+    """Blow the vehicle away: limits are exceeded."""
+    one.plant._wind_mean[:] = 14.0, 0.0, 0.0
+
+
+def hold(one):
+    """Hold by command."""
+    assert one.mission.request(OperatorCommand.HOLD)[0]
+
+
+def land(one):
+    """Land by command."""
+    assert one.mission.request(OperatorCommand.LAND)[0]
+
+
+def pilot(one):
+    """Take over by the pilot's switch."""
+    one.autopilot.autopilot.commander.request_mode(one.plant.time, Mode.HOLD, True)
+
+
+def magnet(one):
+    """Switch the magnet on by command."""
+    assert one.mission.switch_magnet(True)[0]
+
+
+def gains(one):
+    """Change parameters in flight."""
+    controller = one.control.attitude.controller
+    p = controller.parameters
+    changed = tuple(2.0 * value for value in p.feedforward_washout)
+    controller.set_parameters(dataclasses.replace(p, feedforward_washout=changed, prediction=0.01))
+
+
+def full_table(one):
+    """Let the table be full soon."""
+    table = one.recording
+    table.values, table.phases = table.values[: table.count + 7], table.phases[: table.count + 7]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *(late_poses, frozen_poses, broken_estimate, storm, hold, land),
+        *(pilot, magnet, gains, full_table),
+    ],
+)
+def test_an_incident_is_the_same(change):
+    steady, objects = flight(), flight()
+    for one, fly in ((steady, fly_steady), (objects, fly_objects)):
+        fly(one, 1501)
+        assert one.mission.output.state is State.FLYING
+        change(one)
+        fly(one, 4000)
+    assert_same(steady, objects)
+    assert steady.steady.ticks > 800  # it was steady before
+
+
+def test_an_error_of_the_physics_has_its_text():
+    one = flight()
+    fly_steady(one, 1501)
+    one.plant.model.opt.integrator = 99
+    with pytest.raises(PhysicsError, match="MuJoCo: mj_step: invalid integrator"):
+        fly_steady(one, 1600)
+
+
+def test_it_ends_at_the_tick_that_was_asked_for():
+    one = flight()
+    for tick in (700, 701, 703, 850, 1100):
+        fly_steady(one, tick)
+        assert one.plant.tick == tick
+    one.advance(10, 1000)  # enough, most
+    assert 1110 <= one.plant.tick <= 2100
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"faults": ["motor@5+1:part=0.9"]},
+        {"autopilot_imu": True},
+        {"profile": "attitude_setpoints"},
+    ],
+    ids=("faults", "autopilot's IMU", "other setpoints"),
+)
+def test_a_flight_of_another_kind_is_flown_by_the_objects(options):
+    if faults := options.get("faults"):
+        options = {"faults": read_schedule(faults, load_scenario("hover"), seed=1)}
+    one = flight(**options)
+    fly_steady(one, 1000)
+    assert not one.steady.able
+    assert one.steady.ticks == 0
+
+
+def test_effects_are_simulated_by_the_objects():
+    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
+    one = DirectFlight(load_scenario("hover"), load_profile("s500"), vehicle, 0.0, 1)
+    assert not one.steady.able
+
+
+def test_a_law_of_somebodys_own_is_flown_by_the_objects(monkeypatch):
+    one = flight()
+    law = type(one.control.position.controller.law)
+    monkeypatch.setattr(law, "step", staticmethod(lambda *inputs: None))
+    assert not one.steady.able
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="NUMBA_DISABLE_JIT: nothing is compiled")
+def test_no_memory_is_left_behind():
+    one = flight()
+    fly_steady(one, 800)
+    statistics = numba.core.runtime.rtsys.get_allocation_stats
+    before = statistics()
+    fly_steady(one, 2300)
+    after = statistics()
+    assert one.steady.ticks > 1000
+    assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free
