@@ -66,6 +66,30 @@ def of_axes(axes):
     return total(record, 10.0)
 """
 
+# the same source with two functions
+CLOSURE = """
+import numpy as np
+from uam_control.maths.compiled import jit
+
+@jit
+def double(x):
+    return {double} * x
+
+@jit
+def half(x):
+    return 0.5 * x
+
+def with_step(step):
+    @jit
+    def stepped(x):
+        return step(x[0])
+    return stepped
+
+def result(name):
+    stepped = with_step(globals()[name])
+    return float(stepped(np.array([10.0]))), sum(stepped.stats.cache_hits.values())
+"""
+
 
 def write(folder: Path, factor: int = 2, offset: int = 10) -> None:
     (folder / "caller.py").write_text(CALLER)
@@ -119,6 +143,17 @@ def test_a_process_killed_while_it_wrote_leaves_nothing_that_is_loaded(tmp_path,
     for file in tmp_path.glob("__pycache__/*.nbc"):
         file.rename(file.with_name(file.name + ".tmp.0123"))  # as numba writes: then renames
     assert start().call("result", "float64") == (15.0, 0)
+
+
+def test_a_function_with_two_inner_functions_has_the_code_of_each(tmp_path, start):
+    """As the steady ticks of the direct engine, with the step of a law."""
+    (tmp_path / "closure.py").write_text(CLOSURE.format(double=2))
+    for hits in (0, 1):
+        process = start("closure")
+        assert process.call("result", "double") == (20.0, hits)
+        assert process.call("result", "half") == (5.0, hits)
+    (tmp_path / "closure.py").write_text(CLOSURE.format(double=3))
+    assert start("closure").call("result", "double") == (30.0, 0)
 
 
 def test_records_of_two_layouts_compiled_apart_are_distinguished(tmp_path, start):

@@ -21,7 +21,7 @@ from uam_sim_bridge.plant import Vehicle
 sets = load_scenario("pick_and_place"), load_profile({profile!r}), Vehicle.load()
 flight = DirectFlight(*sets, 0.2, 1)
 while flight.mission.output.time < 1.5:
-    flight.tick()
+    flight.advance(10, 10)
 print(json.dumps(flight.recording.values[flight.recording.count - 1].tolist()))
 """
 

@@ -43,8 +43,10 @@ class CompileCache(FunctionCache):
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, function)
 
     def _index_key(self, signature: Any, codegen: Any) -> Any:
-        """Return the key of a signature; numba's contains a number of the process for a function
-        that is defined in another one. What it has from there is in the digest of the sources."""
+        """Return the key of a signature; numba's contains numbers of the process for what a
+        function has from the one that defines it. All of that is in the digest of the sources."""
+        if self._py_func.__closure__ is None:
+            return super()._index_key(signature, codegen)
         return signature, codegen.magic_tuple()
 
     @property
