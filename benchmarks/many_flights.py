@@ -31,7 +31,7 @@ from distributed import LocalCluster
 from uam_control.profiles.profile import load_profile
 from uam_lab.campaign.trial import measure
 from uam_lab.campaign.variations import Draws, ranges
-from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.flight.direct.warm_up import prepare_direct
 from uam_lab.workers.place import Workplace
 from uam_lab.workers.workers import workers
 
@@ -44,9 +44,9 @@ def overhead(options) -> int:
     """Print the time of a flight in a loop, that by a worker, and their ratio."""
     draws = Draws(load_profile("s500"), options.flights, 1, ranges(), options.scenario)
     trials = [one.trial for one in draws]
-    prepare()
+    prepare_direct()
     begun = time.perf_counter()
-    with workers(Workplace(1), prepare) as crew:
+    with workers(Workplace(1), prepare_direct) as crew:
         list(crew.completed(measure, trials[:1]))
         measure(trials[0])
         started = time.perf_counter() - begun

@@ -136,7 +136,7 @@ def direct(what: str, size: int, scenario: Path, vehicle: str) -> Point:
     )
     given = (loaded, profile, Vehicle.of(described), 0.0)
     warm_up([catalogue.DEFAULT])
-    DirectFlight(*given, seed=1).tick()  # compiles what this vehicle needs
+    DirectFlight(*given, seed=1).run()  # compiles what this vehicle needs
     flight = DirectFlight(*given, seed=1)
     begun = time.perf_counter()
     flight.run()

@@ -33,6 +33,7 @@ def fly(
         settings.plant,
         settings.imu == AUTOPILOT_IMU,
     )
+    flight.say = observer.message
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()
     try:

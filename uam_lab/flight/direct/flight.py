@@ -43,7 +43,7 @@ LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 class DirectFlight:
     """One flight in the direct engine; `recording` fills while it flies.
 
-    `mission.output` is its result.
+    `mission.output` is its result. `say`: called with what takes long, a text.
     """
 
     def __init__(
@@ -60,6 +60,7 @@ class DirectFlight:
         """payload_mass [kg]; faults: those that `faults.feasibility.check` lets pass; plant: see
         `plant_class`; autopilot_imu: the estimator has the autopilot's IMU, a tick late."""
         self.autopilot_imu = autopilot_imu
+        self.say: Callable[[str], object] = lambda text: None
         sets = profile.sets
         vehicle = vehicle.changed(servo_mode(profile))
         started = (vehicle, payload_mass, seed, scenario.arm_start)

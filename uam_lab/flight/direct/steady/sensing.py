@@ -16,7 +16,7 @@ from uam_sim_bridge.plant.sensors import BLOCK, Delay, Noise, noisy_pose
 
 RING = 64  # ticks for which samples are kept: more than a sample may be late
 POSE = 8  # stamp [s], position (3,), quaternion (4,)
-VEHICLE, PAYLOAD = 0, 1  # the two poses of a slot
+VEHICLE_POSE, PAYLOAD_POSE = 0, 1  # the two poses of a slot
 
 
 class Sensing(NamedTuple):
@@ -100,7 +100,7 @@ class SensingPart:
         a.waiting[:] = False
         due_poses = plant._mocap_delay.queue
         for due, (stamp, position, quaternion) in due_poses:
-            slot = a.poses[due % RING, VEHICLE]
+            slot = a.poses[due % RING, VEHICLE_POSE]
             slot[0], slot[1:4], slot[4:8] = stamp, position, quaternion
             a.waiting[due % RING] = True
         if plant._tracks_payload:
@@ -108,7 +108,7 @@ class SensingPart:
             if [due for due, _ in payload] != [due for due, _ in due_poses]:
                 return 0
             for due, (stamp, position, quaternion) in payload:
-                slot = a.poses[due % RING, PAYLOAD]
+                slot = a.poses[due % RING, PAYLOAD_POSE]
                 slot[0], slot[1:4], slot[4:8] = stamp, position, quaternion
         mocap = plant._mocap
         a.memory[0] = (
@@ -171,11 +171,11 @@ class SensingPart:
             delay.queue.extend((due, sample(due - late)) for due in range(first, first + late))
         late = plant._mocap_delay.ticks
         for delay, which in (
-            (plant._mocap_delay, VEHICLE),
-            (plant._payload_delay, PAYLOAD),
+            (plant._mocap_delay, VEHICLE_POSE),
+            (plant._payload_delay, PAYLOAD_POSE),
         ):
             delay.queue.clear()
-            if which == VEHICLE or plant._tracks_payload:
+            if which == VEHICLE_POSE or plant._tracks_payload:
                 for due in range(first, first + late + 1):
                     if a.waiting[due % RING]:
                         delay.queue.append((due, self.pose(due % RING, which)))
@@ -215,13 +215,13 @@ def sense(s: Sensing, truth: np.ndarray) -> None:
         m.next_pose += m.pose_period
         due = (m.tick + m.pose_late) % RING
         s.waiting[due] = True
-        pose = s.poses[due, VEHICLE]
+        pose = s.poses[due, VEHICLE_POSE]
         pose[0] = time
         noise = s.pose_noise[m.pose_used]
         noisy_pose(s.observed.position, s.observed.quaternion, noise, pose[1:4], pose[4:8])
         m.pose_used += 1
         if m.tracks:
-            pose = s.poses[due, PAYLOAD]
+            pose = s.poses[due, PAYLOAD_POSE]
             pose[0] = time
             write_grip(s.observed.payload, m.payload_top, s.grip)
             noise = s.payload_noise[m.payload_used]

@@ -1,133 +1,64 @@
-"""The loop over steady ticks, and the object that a flight calls."""
+"""Flies the steady ticks of a flight: when, and what is copied between objects and loop."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from operator import is_
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Protocol
 
 import numpy as np
 
-from uam_control.estimation.estimator import write_biases
-from uam_control.maths.compiled import borrowing, counts_references, inlined, prepared
+from uam_control.maths.compiled import active, counts_references, prepared
 from uam_control.maths.kept_tuple import KeptTuple
 from uam_control.stamps import SECOND, nanoseconds
-from uam_lab.flight.direct.record import MOTORS, RowLayout, record
-from uam_lab.flight.direct.steady.bridge import BridgeArrays, BridgePart, send, take_pose
-from uam_lab.flight.direct.steady.cycle import CycleArrays, CyclePart, cycle
-from uam_lab.flight.direct.steady.estimation import (
-    NOTHING,
-    STEADY,
-    Estimation,
-    EstimationPart,
-    estimate,
-)
-from uam_lab.flight.direct.steady.inputs import (
-    BIAS,
-    JOINTS,
-    MOCAP,
-    PAYLOAD,
-    InputArrays,
-    InputsPart,
-    read_inputs,
-)
+from uam_lab.flight.direct.record import TickRecorder
+from uam_lab.flight.direct.steady.bridge import BridgePart
+from uam_lab.flight.direct.steady.cycle import CyclePart
+from uam_lab.flight.direct.steady.estimation import EstimationPart
+from uam_lab.flight.direct.steady.inputs import InputsPart
 from uam_lab.flight.direct.steady.laws import (
-    ArmArrays,
     ArmPart,
-    AttitudeArrays,
     AttitudePart,
     LawPart,
-    PositionArrays,
-    Steps,
     attitude_arrays,
-    control,
     position_arrays,
 )
-from uam_lab.flight.direct.steady.memory import put
-from uam_lab.flight.direct.steady.places import (
-    AUTOPILOT,
-    BRIDGE,
-    DIVERGE,
-    END,
-    ERROR,
-    ESTIMATE,
-    LAWS,
-    LISTEN,
-    RECORD,
-    REFERENCE,
-    WATCH,
-)
-from uam_lab.flight.direct.steady.reference import (
-    ReferenceArrays,
-    ReferencePart,
-    advance,
-    watch_due,
-)
-from uam_lab.flight.direct.steady.sensing import (
-    PAYLOAD as PAYLOAD_POSE,
-)
-from uam_lab.flight.direct.steady.sensing import (
-    RING,
-    VEHICLE,
-    Sensing,
-    SensingPart,
-    sense,
-    stamp_of,
-    step,
-)
-from uam_sim_bridge.plant import PhysicsError
+from uam_lab.flight.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
+from uam_lab.flight.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
+from uam_lab.flight.direct.steady.reference import ReferencePart
+from uam_lab.flight.direct.steady.sensing import PAYLOAD_POSE, VEHICLE_POSE, SensingPart
+from uam_sim_bridge.autopilot.joined import JoinedAutopilot
+from uam_sim_bridge.plant import PhysicsError, Plant
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
-from uam_sim_bridge.stages.control_tick import STAGES, take_report
+from uam_sim_bridge.stages.control_tick import STAGES, ControlTick, take_report
 
-if TYPE_CHECKING:
-    from uam_lab.flight.direct.flight import DirectFlight
-
+COMPILES = "compiling the direct engine for this law and vehicle (once)"
 LEAST = 2  # ticks for which the copies are worth their time
 
 
-class TickArrays(NamedTuple):
-    """Arrays of all parts.
+class Flight(Protocol):
+    """What the steady ticks need of a `DirectFlight`; see there."""
 
-    state (3, 6 + n): of the estimator; flown (3, 6 + n): reference of the signals; bias (2, 3): for
-    the estimated biases; table, ring, layout: of the recording; motors (rotors,): of the autopilot;
-    counts: see ROW to FAULT; magnet (1,): whether it is on.
-    """
+    plant: Plant
+    control: ControlTick
+    autopilot: JoinedAutopilot
+    autopilot_imu: bool
+    recorder: TickRecorder
+    say: Callable[[str], object]
 
-    sensing: Sensing
-    estimation: Estimation
-    inputs: InputArrays
-    position: PositionArrays
-    attitude: AttitudeArrays
-    arm: ArmArrays
-    bridge: BridgeArrays
-    reference: ReferenceArrays
-    autopilot: CycleArrays
-    state: np.ndarray
-    flown: np.ndarray
-    bias: np.ndarray
-    table: np.ndarray
-    ring: np.ndarray
-    motors: np.ndarray
-    layout: RowLayout
-    counts: np.ndarray
-    magnet: np.ndarray
-
-
-# entries of `counts`: row of the recording, ticks of its ring (first, next), slot of the pose that
-# arrives (-1: none), stamp [ns] of state and of the mission's begin (0: none), whether a setpoint
-# was sent, cycles of the autopilot, address of an error's text
-ROW, FIRST, NEXT, SLOT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(9)
+    def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
+        """Finish a tick that steady ticks have begun."""
 
 
 class SteadyTicks:
-    """Flies the steady ticks of a `DirectFlight`.
+    """Flies the steady ticks of a flight.
 
     `able`: whether the flight may have any; `ticks`: how many it has had.
     """
 
-    def __init__(self, flight: DirectFlight) -> None:
+    def __init__(self, flight: Flight) -> None:
         self._flight, self.ticks = flight, 0
         stages, plant = flight.control, flight.plant
         self.able = type(plant) is MujocoPlant and stages.stages == list(STAGES)
@@ -208,7 +139,7 @@ class SteadyTicks:
             self._inputs.report(stamp, (report.round_trip, report.loop_delay))
             if not self._laws[1].report(stamp, report.loop_delay):
                 return -1
-        most = min(most, len(self._flight.recording.values) - self._counts.item(ROW))
+        most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
         most = min(most, self._sensing.renew(), self._ticks_to_report(stamp))
         return self._reference.renew(self._flight.control.signals.state, most)
 
@@ -249,7 +180,7 @@ class SteadyTicks:
         """Return the loop with the arrays of all parts; made anew if objects have changed."""
         flight, stages = self._flight, self._flight.control
         made = (
-            *(flight.recording.values, stages.estimator.estimator),
+            *(flight.recorder.table.values, stages.estimator.estimator),
             *(one.parameters for one in self._controllers),
             *(stages.bridge.map._flat, flight.autopilot.autopilot._loop),
             *(stages.mission.mission._guidance, stages.mission.mission._parameters),
@@ -279,7 +210,10 @@ class SteadyTicks:
                 self._magnet,
             )
             self._kept = kept = KeptTuple(arrays)
-            self._loop = partial(run(self._steps, kept.read), kept.address)
+            loop = run(self._steps, kept.read)
+            if active() and not loop._cache.filled:
+                flight.say(COMPILES)
+            self._loop = partial(prepared(loop, 0, 0, 0), kept.address)
         self._magnet[0] = stages.signals.magnet
         return self._loop
 
@@ -319,134 +253,7 @@ class SteadyTicks:
         found = [
             sensing.imu(plant.tick - plant._imu_delay.ticks),
             sensing.joints(plant.tick - plant._joints_delay.ticks),
-            None if slot < 0 else sensing.pose(slot, VEHICLE),
+            None if slot < 0 else sensing.pose(slot, VEHICLE_POSE),
             None if slot < 0 or not plant._tracks_payload else sensing.pose(slot, PAYLOAD_POSE),
         ]
         return tuple(one and (nanoseconds(one[0]), *one[1:]) for one in found)
-
-
-@cache
-def run(steps: Steps, arrays: Callable[[int], TickArrays]) -> Callable[[int, int, int], tuple]:
-    """Return the compiled loop; steps: of the laws; arrays: see `KeptTuple.read`."""
-    control_all = control(steps)
-
-    @borrowing
-    def steady_run(address: int, count: int, begin: int) -> tuple[int, int]:
-        """Begin up to `count` ticks and end them; begin: LISTEN, or RECORD to end one first.
-
-        Returns the number of ticks that ended, and where the loop ended.
-        """
-        a = arrays(address)
-        done = 0
-        while True:
-            if begin == LISTEN:
-                if count == 0:
-                    return done, END
-                count -= 1
-                end = begin_tick(a)
-                if end != LAWS:
-                    return done, end
-                control_all(
-                    *(a.position, a.attitude, a.arm, a.reference.memory[0].period),
-                    *(a.counts[STAMP], a.state, a.flown, a.inputs),
-                )
-                end = decide(a)
-                if end != RECORD:
-                    return done, end
-            begin = LISTEN
-            end = end_tick(a)
-            if end != END:
-                return done, end
-            done += 1
-            if a.bridge.memory[0].reported:
-                return done, END
-
-    return prepared(steady_run, 0, 0, 0)
-
-
-@inlined
-def begin_tick(a: TickArrays) -> int:
-    """Do the stages from the sensors to the mission; return LAWS, or where they end."""
-    s, c, i = a.sensing, a.counts, a.inputs
-    rotors = len(a.motors)
-    ring = a.ring[c[NEXT] % len(a.ring)]
-    sense(s, ring[MOTORS + rotors :])
-    m = s.memory[0]
-    slot = c[SLOT] = m.pose
-    joints = s.observed.alpha.shape[0]
-    at = m.tick - m.joints_late
-    row = s.samples[at % RING]
-    joint_stamp = stamp_of(at * m.period)
-    angles, speeds = row[6 : 6 + joints], row[6 + joints : 6 + 2 * joints]
-    pose = s.poses[max(slot, 0), VEHICLE]
-    position, quaternion, pose_stamp = pose[1:4], pose[4:8], -1
-    if slot >= 0:
-        pose_stamp = stamp_of(pose[0])
-        if not take_pose(a.bridge, pose_stamp / SECOND, position, quaternion):
-            return LISTEN
-        i.kept[MOCAP], i.at[MOCAP] = True, pose_stamp
-        put(pose[1:], i.mocap)
-    i.kept[JOINTS], i.at[JOINTS] = True, joint_stamp
-    put(row[6 + 2 * joints :], i.effort)
-    if slot >= 0 and m.tracks:
-        payload = s.poses[slot, PAYLOAD_POSE]
-        i.kept[PAYLOAD], i.at[PAYLOAD] = True, stamp_of(payload[0])
-        put(payload[1:4], i.payload)
-    at = m.tick - m.imu_late
-    sample, stamp = s.samples[at % RING], stamp_of(at * m.period)
-    found = estimate(
-        *(a.estimation, stamp, sample[0:3], sample[3:6], pose_stamp, position, quaternion),
-        *(joint_stamp, angles, speeds, a.state),
-    )
-    if found != STEADY:
-        return ESTIMATE if found == NOTHING else DIVERGE
-    c[STAMP] = stamp
-    if a.estimation.memory[0].bias_due:
-        write_biases(a.estimation.pose, a.bias)
-        i.kept[BIAS], i.at[BIAS] = True, stamp / SECOND
-        put(a.bias[1], i.bias)
-    read_inputs(i, stamp)
-    c[BEGUN] = stamp
-    a.reference.memory[0].begun = a.reference.memory[0].time
-    for row in range(len(a.flown)):
-        put(a.reference.reference[row], a.flown[row])
-    return LAWS
-
-
-@inlined
-def decide(a: TickArrays) -> int:
-    """Do the stages bridge and next reference; return RECORD, or where they end."""
-    c, m = a.counts, a.sensing.memory[0]
-    stamp, tau_p, tau_q = c[STAMP], a.position.law.tau, a.attitude.law.tau
-    time = m.tick * m.period
-    if not send(
-        *(a.bridge, stamp, time, a.state, tau_p, tau_q, a.position.attitude, a.inputs),
-    ):
-        return BRIDGE
-    c[SENT] = 1
-    if not advance(a.reference, a.inputs, stamp, a.state):
-        return REFERENCE
-    return WATCH if watch_due(a.reference) else RECORD
-
-
-@inlined
-def end_tick(a: TickArrays) -> int:
-    """Record the tick, run the autopilot and the physics; return END, or where they end."""
-    c, s, m, bridge = a.counts, a.sensing, a.sensing.memory[0], a.bridge.memory[0]
-    time = m.tick * m.period
-    magnet = 1.0 if a.magnet[0] else 0.0
-    stamp = c[STAMP] / SECOND - m.period / 2.0
-    c[FIRST] = record(
-        *(a.table, c[ROW], a.ring, c[FIRST], c[NEXT], time, a.motors, magnet, stamp),
-        *(a.reference.memory[0].begun, a.state, a.flown, a.position.attitude),
-        *(a.position.law.tau, a.attitude.law.tau, a.arm.law.tau, a.bridge.rates, bridge.sent),
-        *(bridge.used, a.layout),
-    )
-    c[NEXT] += 1
-    c[ROW] += 1
-    sample = s.samples[m.tick % RING]
-    if not cycle(a.autopilot, a.bridge, time, sample[0:3], sample[3:6]):
-        return AUTOPILOT
-    c[CYCLES] += 1
-    c[FAULT] = step(s, a.motors, a.arm.command, a.magnet[0])
-    return ERROR if c[FAULT] else END
