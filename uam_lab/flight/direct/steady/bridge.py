@@ -20,7 +20,7 @@ from uam_sim_bridge.autopilot.autopilot_estimator import (
 )
 from uam_sim_bridge.autopilot.commander import STREAM_GAP
 from uam_sim_bridge.autopilot.core import magnitude_of_usable
-from uam_sim_bridge.autopilot.joined import JoinedAutopilot, always, at_once
+from uam_sim_bridge.autopilot.joined import always, at_once
 from uam_sim_bridge.mavlink.offboard.hold import _THRUST_TIME
 from uam_sim_bridge.mavlink.offboard.loop_delay import DelayNumbers
 from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, LINK_GAP, Phase
@@ -78,8 +78,7 @@ class BridgePart:
         bridge, port = self._bridge, self._bridge.autopilot
         link = (port.passes, port.receives, port.late_to, port.late_from)
         return (
-            isinstance(port, JoinedAutopilot)
-            and link == (always, always, at_once, at_once)
+            link == (always, always, at_once, at_once)
             and bridge.source._type is rates_setpoint
             and bridge._hold.rate <= 0.0
             and not bridge._dry_run

@@ -11,6 +11,8 @@ import numpy as np
 
 from uam_control.maths.compiled import active, counts_references, prepared
 from uam_control.maths.kept_tuple import KeptTuple
+from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.mission_stage import MissionStage
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flight.direct.record import TickRecorder
 from uam_lab.flight.direct.steady.bridge import BridgePart
@@ -28,10 +30,12 @@ from uam_lab.flight.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
 from uam_lab.flight.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
 from uam_lab.flight.direct.steady.reference import ReferencePart
 from uam_lab.flight.direct.steady.sensing import PAYLOAD_POSE, VEHICLE_POSE, SensingPart
+from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.plant import PhysicsError, Plant
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+from uam_sim_bridge.stages.bridge_stage import BridgeStage
 from uam_sim_bridge.stages.control_tick import STAGES, ControlTick, take_report
 
 COMPILES = "compiling the direct engine for this law and vehicle (once)"
@@ -60,12 +64,17 @@ class SteadyTicks:
 
     def __init__(self, flight: Flight) -> None:
         self._flight, self.ticks = flight, 0
-        stages, plant = flight.control, flight.plant
-        self.able = type(plant) is MujocoPlant and stages.stages == list(STAGES)
+        stages, plant, port = flight.control, flight.plant, flight.autopilot
+        kinds = (  # none of a class of its own
+            *((plant, MujocoPlant), (port, JoinedAutopilot), (stages.bridge, BridgeStage)),
+            *((stages.estimator, EstimatorStage), (stages.mission, MissionStage)),
+        )
+        usual = all(type(one) is kind for one, kind in kinds) and stages.stages == list(STAGES)
+        self.able = usual and type(port.autopilot) is Autopilot and not flight.autopilot_imu
         if not self.able:
             return
         self._sensing, self._bridge = SensingPart(plant), BridgePart(stages.bridge)
-        self.able = self._sensing.able() and self._bridge.able() and not flight.autopilot_imu
+        self.able = self._sensing.able() and self._bridge.able()
         if not self.able:
             return
         laws = (stages.position, stages.attitude, stages.arm)
