@@ -148,7 +148,7 @@ def draw(found: dict[str, float], ratio: float, file: Path) -> None:
     colours = ["#888888" if name == PHYSICS else "#1f77b4" for name in names]
     bars = axes.barh(names, [found[name] for name in names], color=colours)
     axes.bar_label(bars, fmt="%.1f", padding=3)
-    axes.set_xlabel(f"time per tick [us]; a tick takes {ratio:.1f} times its physics")
+    axes.set_xlabel(f"time per tick [us]; in all {ratio:.1f} times the physics")
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
 

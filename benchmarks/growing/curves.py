@@ -14,6 +14,7 @@ from uam_lab.report.figures import style
 
 matplotlib.use("Agg")
 
+ABOVE = 1.1  # of the largest value: end of the axis
 HEAD = ("what grows", "size", "layout", "ticks/s", "of its first", "memory [MB]", "log [MB/min]")
 ROWS: tuple[tuple[str, Callable[[Point], float]], ...] = (
     ("ticks per second", lambda point: point.ticks_per_second),
@@ -57,12 +58,12 @@ def draw(points: Sequence[Point], *files: Path) -> None:
                 right = axes[0, column].twinx()
                 sizes, values = [p.size for p in curve], [p.ticks_per_second for p in curve]
                 right.plot(sizes, values, "s--", color=style.MUTED, label=DIRECT)
-                right.set_ylim(0.0, None)
+                right.set_ylim(0.0, ABOVE * right.dataLim.y1)
                 right.grid(visible=False)
                 right.legend(loc="lower left")
-        for axis in axes[:, 0]:  # shared by its row, so after the last column's points
-            axis.set_ylim(0.0, None)
-        axes[0, -1].legend(loc="upper right")
+        for row in axes:  # shared, so after the last column's points
+            row[0].set_ylim(0.0, ABOVE * max(axis.dataLim.y1 for axis in row))
+        axes[0, -1].legend(loc="lower left")
         for file in files:
             style.save(figure, file)
 
