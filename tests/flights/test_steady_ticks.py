@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
+import weakref
 
 import numba
 import numpy as np
@@ -251,3 +253,17 @@ def test_no_memory_is_left_behind(allocations):
     made, freed = allocations() - before
     assert one.steady.ticks > 1000
     assert made == freed > 1000
+
+
+def test_a_flight_is_freed_with_its_last_reference():
+    """Garbage collection alone would come late: a flight has megabytes, a campaign thousands."""
+    one = flight()
+    fly_steady(one, 1000)
+    assert one.steady.ticks
+    watched = weakref.ref(one)
+    gc.disable()
+    try:
+        del one
+        assert watched() is None
+    finally:
+        gc.enable()

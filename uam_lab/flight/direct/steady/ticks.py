@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from operator import is_
 from typing import Protocol
+from weakref import proxy
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class SteadyTicks:
     """
 
     def __init__(self, flight: Flight) -> None:
-        self._flight, self.ticks = flight, 0
+        self._flight, self.ticks = proxy(flight), 0  # the flight owns this object
         stages, plant, port = flight.control, flight.plant, flight.autopilot
         kinds = (  # none of a class of its own
             *((plant, MujocoPlant), (port, JoinedAutopilot), (stages.bridge, BridgeStage)),
