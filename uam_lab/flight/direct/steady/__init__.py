@@ -6,7 +6,7 @@ tick are one compiled loop of the same functions, in the order of `stages.contro
 
 Each stage has a part: it copies the state of its objects into arrays (`load`), runs compiled, and
 copies the state back (`store`). Before it changes anything, a compiled stage looks whether there is
-something to decide: a pose that jumps, a limit, a report that is due. If so, the loop ends there,
+something to decide: a pose that jumps, a value beyond a limit. If so, the loop ends there,
 and the objects themselves do this stage and the rest of the tick. So all decisions are made by the
 objects, and a recording is the same bit for bit (tests/flights/test_steady_ticks.py).
 
@@ -15,5 +15,5 @@ nobody copies their state. Whoever changes the state of a stage changes its part
 notices what is missing.
 
 A flight with faults, effects, a plant or a setpoint of its own is flown by the objects alone; see
-`ready` of each part.
+`able` of the parts.
 """
