@@ -80,3 +80,14 @@ def test_a_function_without_machine_code_is_prepared_as_it_is():
         return 2 * x
 
     assert compiled.prepared(function, 1.0) is function
+
+
+def test_with_a_numba_that_always_counts_references_no_function_borrows(monkeypatch):
+    monkeypatch.setattr(compiled, "_COUNTS", "")
+
+    def double(x):
+        return 2 * x
+
+    plain, borrowing = compiled.jit(double), compiled.borrowing(double)
+    assert plain(3) == borrowing(3) == 6
+    assert not compiled.active() or not compiled.counts_references(plain)

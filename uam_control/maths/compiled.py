@@ -13,12 +13,17 @@ from typing import TypeVar
 
 try:
     import numba
+    from numba.core.options import DefaultOptions
 
     from uam_control.maths.compile_cache import CompileCache
 except ImportError:
-    numba = None
+    numba = DefaultOptions = None
 
 F = TypeVar("F", bound=Callable)
+
+
+# an option of numba for its own use; without it, no function borrows: see `counts_references`
+_COUNTS = "_nrt" if hasattr(DefaultOptions, "_nrt") else ""
 
 
 def active() -> bool:
@@ -31,8 +36,7 @@ def jit(function: F) -> F:
     if numba is None:
         return function
     # the wrapper for callers in C is not used here; without it, compiling takes 6 % less
-    # _nrt: not as in a caller under `borrowing`
-    compiled = numba.njit(no_cfunc_wrapper=True, _nrt=True)(function)
+    compiled = numba.njit(no_cfunc_wrapper=True, **_counting(True))(function)
     if active():
         compiled._cache = CompileCache(function)
     return compiled
@@ -47,7 +51,7 @@ def borrowing(function: F) -> F:
     """
     if numba is None:
         return function
-    compiled = numba.njit(no_cfunc_wrapper=True, _nrt=False)(function)
+    compiled = numba.njit(no_cfunc_wrapper=True, **_counting(False))(function)
     if active():
         compiled._cache = CompileCache(function)
     return compiled
@@ -55,12 +59,18 @@ def borrowing(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Return `function`, compiled as a part of each function that calls it, see `borrowing`."""
-    return function if numba is None else numba.njit(inline="always", _nrt=False)(function)
+    return function if numba is None else numba.njit(inline="always", **_counting(False))(function)
 
 
 def counts_references(function: Callable) -> bool:
     """Return whether a function under `borrowing` may call this one: it is under `jit`."""
-    return not active() or bool(getattr(function, "targetoptions", {}).get("_nrt"))
+    return not active() or bool(getattr(function, "targetoptions", {}).get(_COUNTS))
+
+
+def _counting(on: bool) -> dict[str, bool]:
+    """Return the option of numba for counting references or not; a called function has that of its
+    caller otherwise."""
+    return {_COUNTS: on} if _COUNTS else {}
 
 
 def prepared(function: F, *arguments: object) -> F:
