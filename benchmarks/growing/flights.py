@@ -21,7 +21,6 @@ from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.budget.flown import CONTROL
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.direct.warm_up import warm_up
 from uam_lab.processes.process_table import nodes
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.ports import INSTANCES, ports_of
@@ -135,7 +134,6 @@ def direct(what: str, size: int, scenario: Path, vehicle: str) -> Point:
         load_scenario(str(scenario), described),
     )
     given = (loaded, profile, Vehicle.of(described), 0.0)
-    warm_up([catalogue.DEFAULT])
     DirectFlight(*given, seed=1).run()  # compiles what this vehicle needs
     flight = DirectFlight(*given, seed=1)
     begun = time.perf_counter()

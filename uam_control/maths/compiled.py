@@ -33,13 +33,7 @@ def active() -> bool:
 
 def jit(function: F) -> F:
     """Return `function`, compiled on its first call; without numba, return it unchanged."""
-    if numba is None:
-        return function
-    # the wrapper for callers in C is not used here; without it, compiling takes 6 % less
-    compiled = numba.njit(no_cfunc_wrapper=True, **_counting(True))(function)
-    if active():
-        compiled._cache = CompileCache(function)
-    return compiled
+    return _compiled(function, counting=True)
 
 
 def borrowing(function: F) -> F:
@@ -49,9 +43,14 @@ def borrowing(function: F) -> F:
     use the arrays of their arguments. They allocate none, and call none that returns one, as
     nobody would free it.
     """
+    return _compiled(function, counting=False)
+
+
+def _compiled(function: F, counting: bool) -> F:
     if numba is None:
         return function
-    compiled = numba.njit(no_cfunc_wrapper=True, **_counting(False))(function)
+    # the wrapper for callers in C is not used here; without it, compiling takes 6 % less
+    compiled = numba.njit(no_cfunc_wrapper=True, **_counting(counting))(function)
     if active():
         compiled._cache = CompileCache(function)
     return compiled

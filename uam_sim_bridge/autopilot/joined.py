@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import prepared
+from uam_control.maths.compiled import jit, prepared
 from uam_sim_bridge.autopilot.autopilot_estimator import age_of
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
@@ -195,13 +195,14 @@ class JoinedAutopilot(FlightState):
             self._heartbeat_due = self._landed_due = -math.inf
         if time >= self._heartbeat_due - 1e-9:
             self._heartbeat = True
-            self._heartbeat_due = _following(self._heartbeat_due, HEARTBEAT, time)
+            self._heartbeat_due = following(self._heartbeat_due, HEARTBEAT, time)
         if time >= self._landed_due - 1e-9:
             self._landed = True
-            self._landed_due = _following(self._landed_due, LANDED, time)
+            self._landed_due = following(self._landed_due, LANDED, time)
         return motors
 
 
-def _following(due: float, interval: float, time: float) -> float:
+@jit
+def following(due: float, interval: float, time: float) -> float:
     """Return the time [s] of the report after the one due at `due`; as in `Telemetry.due`."""
     return due + interval if due + interval > time else time + interval

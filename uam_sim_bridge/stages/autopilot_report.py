@@ -52,18 +52,10 @@ class AutopilotReports:
 
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
-        autopilot, sequence = self._autopilot, self._sequence
-        what = (
-            autopilot.connected(stamp / SECOND),
-            autopilot.mode,
-            autopilot.armed,
-            sequence.phase,
-            sequence.reasons,
-            sequence.released_to,
-            autopilot.landed,
-        )
+        what = self.what(stamp)
         if stamp < self._due and what == self._reported:
             return None
+        autopilot = self._autopilot
         since, delay = autopilot.armed_since, self._loop_delay.value
         self._due, self._reported = stamp + REPORT_PERIOD, what
         self.last = AutopilotReport(
@@ -73,3 +65,16 @@ class AutopilotReports:
             None if math.isnan(delay) else delay,
         )
         return self.last
+
+    def what(self, stamp: int) -> tuple:
+        """Return what a change of brings a report at the tick `stamp` [ns]; `connected` first."""
+        autopilot, sequence = self._autopilot, self._sequence
+        return (
+            autopilot.connected(stamp / SECOND),
+            autopilot.mode,
+            autopilot.armed,
+            sequence.phase,
+            sequence.reasons,
+            sequence.released_to,
+            autopilot.landed,
+        )

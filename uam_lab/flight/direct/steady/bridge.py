@@ -11,7 +11,7 @@ from uam_control.maths.compiled import borrowing, jit
 from uam_control.stamps import MOST_AHEAD, SECOND
 from uam_lab.flight.direct.steady.estimation import keep_pose, same
 from uam_lab.flight.direct.steady.inputs import LIFT, InputArrays
-from uam_lab.flight.direct.steady.memory import put, record
+from uam_lab.flight.direct.steady.memory import load_pose, numbers, put, record, store_pose
 from uam_sim_bridge.autopilot.autopilot_estimator import (
     OLDEST,
     VISION_TIMEOUT,
@@ -89,7 +89,7 @@ class BridgePart:
         bridge, port, sequence = self._bridge, self._bridge.autopilot, self._bridge.sequence
         source, vision, reports = bridge.source, bridge._vision, bridge._reports
         hold, told, commander = source._hold, port._told, port.autopilot.commander
-        newest, status = b"".join(vision._repeats._last), port.autopilot.status
+        what, status = reports.what(bridge._last), port.autopilot.status
         ready = (
             bridge._situation == Situation(True, False, False)
             and not (bridge._orders or bridge.hands or bridge.identification.magnet_waits)
@@ -103,14 +103,13 @@ class BridgePart:
             and sequence._desired
             and not sequence._killed
             and sequence._offboard_since is not None
-            and reports._reported is not None
-            and reports._reported == (True, *self._what())
-            and len(newest) == 56
+            and reports._reported == what
+            and what[0]  # connected
+            and load_pose(vision._repeats, self._newest)
             and math.isfinite(port._period)
         )
         if not ready:
             return False
-        self._newest[:] = np.frombuffer(newest)
         waiting = vision._pose
         if waiting is not None:
             self._pose[:3], self._pose[3:] = waiting[1:]
@@ -137,12 +136,6 @@ class BridgePart:
     def due(self) -> int:
         """Stamp [ns] from which on a report of the autopilot is due."""
         return self._bridge._reports._due
-
-    def _what(self) -> tuple:
-        """Return what a report has after `connected` while nothing is to be decided."""
-        port, sequence = self._bridge.autopilot, self._bridge.sequence
-        link = port.mode, port.armed, sequence.phase, sequence.reasons, sequence.released_to
-        return *link, port.landed
 
     def arrays(self) -> BridgeArrays:
         """Return the arrays."""
@@ -180,10 +173,9 @@ class BridgePart:
         """
         bridge, port, sequence = self._bridge, self._bridge.autopilot, self._bridge.sequence
         source, vision, hold = bridge.source, bridge._vision, bridge.source._hold
-        m = dict(zip(self.memory.dtype.names, self.memory[0].item(), strict=True))
+        m = numbers(self.memory)
         estimator, commander = port.autopilot.estimator, port.autopilot.commander
-        newest = self._newest.tobytes()
-        vision._repeats._last = newest[:24], newest[24:]
+        store_pose(self._newest, vision._repeats)
         vision._sent = m["vision_sent"]
         pose = self._pose.copy()
         vision._pose = (m["exposed"], pose[:3], pose[3:]) if m["pose_waits"] else None
@@ -197,9 +189,7 @@ class BridgePart:
         hold._time, hold._thrust, hold._yaw = m["hold_time"], m["hold_thrust"], m["hold_yaw"]
         commander._stream_start, commander._stream_last = m["stream_start"], m["stream_last"]
         bridge.map.thrust_factor, bridge.factor = m["factor"], m["used"]
-        bridge._last, bridge.lift_due, bridge.report = m["last"], False, None
-        if m["reported"]:
-            bridge.report = bridge._reports.due(m["last"])
+        bridge._last, bridge.lift_due, bridge.report = m["last"], False, self.report()
         if not sent:
             return
         source.note_state(estimated, state)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.compiled import borrowing
 from uam_lab.flight.direct.steady.bridge import BridgeArrays
 from uam_lab.flight.direct.steady.memory import record
 from uam_sim_bridge.autopilot.autopilot_estimator import (
@@ -16,7 +16,7 @@ from uam_sim_bridge.autopilot.autopilot_estimator import (
     predict,
 )
 from uam_sim_bridge.autopilot.core import LONGEST_STEP, SHORTEST_STEP, RateLoop, control_tick
-from uam_sim_bridge.autopilot.joined import HEARTBEAT, LANDED, JoinedAutopilot
+from uam_sim_bridge.autopilot.joined import HEARTBEAT, LANDED, JoinedAutopilot, following
 from uam_sim_bridge.mavlink.protocol.frames import swap_sample
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 
@@ -105,9 +105,3 @@ def cycle(
         link.landed = 1
         m.landed_due = following(m.landed_due, LANDED, time)
     return True
-
-
-@jit
-def following(due: float, interval: float, time: float) -> float:
-    """Return the time [s] of the report after the one due at `due`; see `Telemetry.due`."""
-    return due + interval if due + interval > time else time + interval

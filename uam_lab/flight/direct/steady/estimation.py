@@ -27,7 +27,7 @@ from uam_control.maths.compiled import borrowing
 from uam_control.stages.estimator_stage import BIAS_PERIOD, MEMORY, EstimatorStage, believable
 from uam_control.stages.tick_stamps import WINDOW
 from uam_control.stamps import SECOND
-from uam_lab.flight.direct.steady.memory import put, record
+from uam_lab.flight.direct.steady.memory import load_pose, numbers, put, record, store_pose
 
 NOTHING, STEADY, DIVERGED = range(3)  # what `estimate` has done
 
@@ -43,7 +43,7 @@ class Estimation(NamedTuple):
     memory: np.ndarray
 
 
-WHOLE = "stamp period count bias_due arrived age_known largest_age"
+WHOLE = "stamp period count bias_due age_known largest_age"
 REAL = (
     "imu_stamp joint_stamp step age "
     "last_correction compared widest "
@@ -76,7 +76,7 @@ class EstimationPart:
         stage, ticks = self._stage, self._stage.ticks
         estimator, age = stage.estimator, stage.pose_age
         pose, p = estimator._pose, estimator.parameters
-        gate, newest = pose.gate, b"".join(pose._repeats._last)
+        gate = pose.gate
         ready = (
             not stage._waiting
             and not stage.held_back
@@ -87,17 +87,17 @@ class EstimationPart:
             and pose._last_correction is not None
             and gate._rejecting_since is None
             and age._arrived is None
-            and len(newest) == 56
         )
         if not ready:
             return False
         if self._of is not estimator:
             self._new_arrays()
         a, self._begun = self.arrays, ticks.stamp
-        a.newest[:] = np.frombuffer(newest)
+        if not load_pose(pose._repeats, a.newest):
+            return False
         a.bandwidths[:] = pose._bandwidths
         a.memory[0] = (
-            *(ticks.stamp, ticks.period, pose._count, stage.bias_due, 0),
+            *(ticks.stamp, ticks.period, pose._count, stage.bias_due),
             *(age.mean is not None, age.largest),
             *(estimator._imu_stamp, estimator._joint_stamp, estimator._period, age.mean or 0.0),
             *(pose._last_correction, pose._compared, pose._widest),
@@ -113,7 +113,7 @@ class EstimationPart:
         stage, a = self._stage, self.arrays
         estimator, ticks, age = stage.estimator, stage.ticks, stage.pose_age
         pose, gate = estimator._pose, estimator._pose.gate
-        m = dict(zip(a.memory.dtype.names, a.memory[0].item(), strict=True))
+        m = numbers(a.memory)
         stamp, period = m["stamp"], ticks.period
         first = max(self._begun, stamp - (WINDOW + 1) * period) + period
         ticks._window.extend(range(first, stamp + 1, period))
@@ -125,8 +125,7 @@ class EstimationPart:
         estimator._period = m["step"]
         pose._last_correction, pose._compared = m["last_correction"], m["compared"]
         gate._suspended, gate._last = m["gate_suspended"], m["gate_last"]
-        newest = a.newest.tobytes()
-        pose._repeats._last = newest[:24], newest[24:]
+        store_pose(a.newest, pose._repeats)
 
 
 @borrowing
@@ -169,8 +168,6 @@ def estimate(
         return NOTHING
     if pose_stamp >= 0 and not correct_pose(a, pose_stamp / SECOND, position, quaternion):
         return NOTHING
-    if pose_stamp >= 0:
-        m.arrived = pose_stamp
     at = joint_stamp / SECOND
     dt = min(max(at - m.joint_stamp, 0.0), LONGEST_STEP)
     m.joint_stamp = at

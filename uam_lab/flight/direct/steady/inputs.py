@@ -21,7 +21,7 @@ from uam_control.supervision.inputs import (
     largest_of,
 )
 from uam_lab.flight.direct.steady.estimation import keep_pose, same
-from uam_lab.flight.direct.steady.memory import put, record
+from uam_lab.flight.direct.steady.memory import load_pose, numbers, put, record, store_pose
 
 _NAMES = [check.reading for check in CHECKS if check.reading]  # as `readings_of`
 _MOCAP_AGE, _STILL, _JOINT_AGE, _AUTOPILOT_AGE, _CONTROLLER_AGE, _CONTRADICTION, _MISSED = (
@@ -89,11 +89,10 @@ class InputsPart:
     def load(self) -> bool:
         """Copy the state into the arrays; return whether its ticks may be steady."""
         inputs = self._kept.inputs
-        readings, newest = inputs._readings, b"".join(inputs._repeats._last)
+        readings = inputs._readings
         messages = {name: all_of_it[-1] for name, all_of_it in self._kept._kept.items()}
         ready = (
-            len(newest) == 56
-            and not inputs._gaps
+            not inputs._gaps
             and inputs._last is not None
             and len(inputs._controllers) == len(SUBSYSTEMS)
             and all(names in inputs._watched for names in self._names)
@@ -107,6 +106,8 @@ class InputsPart:
         if self.arrays is None:
             self._allocate()
         a = self.arrays
+        if not load_pose(inputs._repeats, a.newest):
+            return False
         a.kept[:] = False
         lift = math.nan
         for name, (_, message, _) in messages.items():
@@ -129,7 +130,6 @@ class InputsPart:
         a.read_payload[:] = readings.payload_position
         a.read_effort[:] = readings.joint_effort
         a.bias_mean[:] = inputs._bias_mean
-        a.newest[:] = np.frombuffer(newest)
         a.values[:] = readings_of(readings)
         a.largest[:] = readings.gains
         bias, controllers = inputs._bias, inputs._controllers
@@ -159,7 +159,7 @@ class InputsPart:
     def store(self) -> None:
         """Copy the state back."""
         kept, inputs, a = self._kept, self._kept.inputs, self.arrays
-        m = dict(zip(a.memory.dtype.names, a.memory[0].item(), strict=True))
+        m = numbers(a.memory)
         self._store_messages(m["lift_kept"])
         kept._read_at = kept._now = m["read_at"]
         self.store_readings()
@@ -175,8 +175,7 @@ class InputsPart:
         inputs._moved, inputs._last = m["moved"], m["last"]
         inputs._bias = (m["bias_first"], m["bias_last"]) if m["bias_known"] else None
         inputs._bias_mean[:] = a.bias_mean
-        newest = a.newest.tobytes()
-        inputs._repeats._last = newest[:24], newest[24:]
+        store_pose(a.newest, inputs._repeats)
         for name in SUBSYSTEMS:
             inputs._controllers[name] = m[name]
             if name in inputs._of_pose:
@@ -202,7 +201,7 @@ class InputsPart:
         kept, inputs, a = self._kept, self._kept.inputs, self.arrays
         kept._kept = {}
         for kind in np.flatnonzero(a.kept).tolist():
-            at, name, answers = a.at.item(kind), KINDS[kind], -1
+            at = a.at.item(kind)
             if kind == MOCAP:
                 read, message = kept.mocap, (int(at), a.mocap[:3].copy(), a.mocap[3:].copy())
             elif kind == JOINTS:
@@ -216,8 +215,8 @@ class InputsPart:
                 read, message = inputs.lift, (lift,)
             else:
                 gains, names = a.gains[kind - GAINS].copy(), self._names[kind - GAINS]
-                read, message = inputs.gains, (at, name, names, gains)
-            kept._kept[name] = [(read, message, answers)]
+                read, message = inputs.gains, (at, KINDS[kind], names, gains)
+            kept._kept[KINDS[kind]] = [(read, message, -1)]  # of a tick that is over
 
 
 @borrowing

@@ -1,9 +1,10 @@
-"""Structured arrays (1,) for the numbers of a part."""
+"""What the parts share: structured arrays (1,) for their numbers, and poses that repeat."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from uam_control.estimation.repeats import Repeats
 from uam_control.maths.compiled import borrowing
 
 
@@ -12,6 +13,24 @@ def record(whole: str, real: str) -> np.ndarray:
     fields = [(name, np.int64) for name in whole.split()]
     fields += [(name, np.float64) for name in real.split()]
     return np.zeros(1, np.dtype((np.record, fields)))  # fields are attributes in plain Python, too
+
+
+def numbers(memory: np.ndarray) -> dict[str, int | float]:
+    """Return the numbers of a structured array (1,) by name."""
+    return dict(zip(memory.dtype.names, memory[0].item(), strict=True))
+
+
+def load_pose(repeats: Repeats, newest: np.ndarray) -> bool:
+    """Write the pose that `repeats` compares with to newest (7,); False: there is none."""
+    pose = b"".join(repeats._last)
+    if pose:
+        newest[:] = np.frombuffer(pose)
+    return bool(pose)
+
+
+def store_pose(newest: np.ndarray, repeats: Repeats) -> None:
+    """Let `repeats` compare the next pose with newest (7,)."""
+    repeats._last = newest[:3].tobytes(), newest[3:].tobytes()
 
 
 @borrowing

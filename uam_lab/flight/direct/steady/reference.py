@@ -23,7 +23,7 @@ from uam_control.supervision import Guide, State
 from uam_control.supervision.checks import measure_all
 from uam_control.supervision.setpoint_delay import SYMMETRIC
 from uam_lab.flight.direct.steady.inputs import InputArrays
-from uam_lab.flight.direct.steady.memory import record
+from uam_lab.flight.direct.steady.memory import numbers, record
 
 MOST = 64  # ticks whose reference is computed ahead
 STATES = (State.TAKING_OFF, State.FLYING, State.LANDING)
@@ -224,7 +224,7 @@ class ReferencePart:
         stage, mission, supervisor = self._stage, self._mission, self._mission._supervisor
         guidance = mission._guidance
         self._store_seen(state)
-        m = dict(zip(self.memory.dtype.names, self.memory[0].item(), strict=True))
+        m = numbers(self.memory)
         if m["now"] > self._begun:
             seen = mission._in_flight
             seen.armed, seen.touchdown, seen.on_ground = True, False, bool(m["on_ground"])

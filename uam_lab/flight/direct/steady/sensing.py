@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
-from uam_lab.flight.direct.steady.memory import record
+from uam_lab.flight.direct.steady.memory import numbers, record
 from uam_sim_bridge.plant import TruthRow
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.observation import Observed, observe, write_grip
@@ -156,8 +156,7 @@ class SensingPart:
 
     def store(self, observed: bool) -> None:
         """Copy the state back; observed: whether the present tick has been."""
-        plant, a, m = self._plant, self.arrays, self.arrays.memory[0].item()
-        values = dict(zip(a.memory.dtype.names, m, strict=True))
+        plant, a, values = self._plant, self.arrays, numbers(self.arrays.memory)
         self._store_used()
         tick = plant.tick = values["tick"]
         plant._mocap.next = values["next_pose"]
