@@ -106,6 +106,14 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     assert vehicle.path[-1].header.frame_id == "world"
     assert (end.x, end.y, end.z) == pytest.approx((0.3, 0.0, 1.0))
 
+    # the same goal again changes nothing; a stream of it neither
+    for _ in range(5):
+        assert answer(vehicle, topics.GOAL_POSE, goal(0.3, 0.0, 1.0, 0.4)) == (
+            "accepted: at the end in 0.0 s"
+        )
+        vehicle.fly(2)
+    assert vehicle.status.state == "holding"
+
     # RViz's 2D tool sends z = 0
     assert answer(vehicle, topics.GOAL_POSE, goal(0.2, 0.0, 0.0)).startswith("accepted")
     vehicle.until_state("flying")
@@ -132,3 +140,18 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     assert vehicle.ask("land")[0]
     vehicle.until_state("landing")
     assert answer(vehicle, topics.GOAL_POSE, goal(0.0, 0.0, 1.0)) == "refused: not while landing"
+
+
+def test_a_stream_of_goals_arrives(vehicle):
+    """20 Hz, each 2 mm farther; then the last one again and again."""
+    take_off(vehicle)
+    begun = vehicle.stamp
+    for i in range(100):
+        text = answer(vehicle, topics.GOAL_POSE, goal(min(0.4 + 0.002 * i, 0.5), 0.0, 1.0, 0.0))
+        assert text.startswith("accepted"), text
+        vehicle.fly(12)
+        if vehicle.status.state == "holding":
+            break
+    vehicle.until_state("holding")
+    np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.5, 0, 1, 0], atol=1e-9)
+    assert vehicle.stamp - begun < 6.0e9

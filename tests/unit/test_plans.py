@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from uam_control.coordinates import ARM, CHI, YAW
 from uam_control.mission import Mission, MissionParameters, load_scenario
 from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check
-from uam_control.supervision import OperatorCommand, Readings, State
+from uam_control.supervision import Event, OperatorCommand, Readings, State
 from uam_control.vehicle import derived_parameters, load_description
 
 P = MissionParameters.from_mapping(derived_parameters(load_description())["mission"], 2)
@@ -70,10 +70,63 @@ def test_a_goal_is_reached_exactly_from_any_motion(x, y, z, yaw, speed):
 
 def test_a_goal_at_rest_takes_the_time_of_its_peak_speed_by_hand():
     plan = GoalPose(np.array([3.0, 0.0, 1.0])).plan(10.0, reference(), P)
-    assert plan.end == pytest.approx(10.0 + 1.875 * 3.0 / 0.3)
+    assert plan.end == pytest.approx(10.0 + 3.0 / 0.3 + 1.0)  # half of stop_time at either end
     assert np.abs(plan.at(plan.samples())[1]).max() == pytest.approx(0.3)
     half = plan.at(np.array([(plan.end - 10.0) / 2]))
     assert half[0, 0, 0] == pytest.approx(1.5) and half[1, 0, 0] == pytest.approx(0.3)
+
+
+def streamed(goal, rate, limit=60.0, dt=0.02, start=0.0):
+    """Follow goal(time) replanned `rate` times a second; return stamps and motions (q, 5, 8)."""
+    motion, stamps, found, plan = np.zeros((5, 8)), np.arange(0.0, limit, dt), [], None
+    motion[:3] = reference(speed=(start, 0.0, 0.0))
+    every = max(1, round(1.0 / (rate * dt)))
+    for i, stamp in enumerate(stamps):
+        if plan is None or i % every == 0:
+            plan = goal(stamp).plan(stamp, motion[:3], P)
+            check(plan, P, ground=0.28)
+        plan.write(stamp + dt, motion)
+        found.append(motion.copy())
+    return stamps + dt, np.array(found)
+
+
+@pytest.mark.parametrize("rate", [1, 25])
+@pytest.mark.parametrize("distance", [1.0, 4.9])
+def test_goals_that_move_a_little_arrive_nearly_as_soon_as_one_goal(distance, rate):
+    stamps, found = streamed(
+        lambda stamp: GoalPose(np.array([distance, 0.1 * np.sin(stamp), 1.0]), 0.0),
+        rate,
+        25.0,
+    )
+    once = GoalPose(np.array([distance, 0.0, 1.0]), 0.0).plan(0.0, reference(), P).end
+    near = np.abs(found[:, CHI, 0] - distance) < 0.05
+    assert stamps[np.argmax(near)] < once + 1.0
+    assert np.linalg.norm(found[:, 1, :3], axis=1).max() < 1.1 * P.goal_speed
+    assert np.linalg.norm(found[:, 2, :3], axis=1).max() < 1.2 * P.stop_acceleration
+    dt = stamps[1] - stamps[0]
+    slopes = (found[2:, :2, :6] - found[:-2, :2, :6]) / (2 * dt)
+    np.testing.assert_allclose(slopes, found[1:-1, 1:3, :6], atol=0.02)
+
+
+@pytest.mark.parametrize("rate", [1, 5, 50])
+def test_goals_that_run_ahead_are_followed_without_braking(rate):
+    """A goal 1 m ahead that moves at 0.2 m/s: the speed never falls after the first second."""
+    _, found = streamed(lambda at: GoalPose(np.array([1.0 + 0.2 * at, 0.0, 1.0])), rate, 15.0)
+    speed = found[:, 1, 0]
+    assert speed[60:].min() > 0.19 and found[-1, 1, 0] == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize("rate", [2, 20])
+def test_a_horizon_that_moves_does_not_brake(rate):
+    """Trajectories of a planner, each from the present place on, without velocities."""
+
+    def ahead(stamp):
+        times = [0.0, 1.0, 2.0, 3.0]
+        return base(times, [(0.2 * (stamp + after), 0.0, 1.0) for after in times])
+
+    _, found = streamed(ahead, rate, 10.0, start=0.2)
+    assert found[:, 1, 0].min() > 0.15 and found[:, 1, 0].max() < 0.25
+    assert found[-1, CHI, 0] == pytest.approx(2.0, abs=0.1)
 
 
 def test_nan_keeps_height_and_heading():
@@ -281,6 +334,82 @@ def test_goal_hold_resume_and_land_are_smooth(during):
     flight.until(lambda output: output.done)
     assert flight.mission.output.phase == "landed" and flight.mission.output.abort_reason == ""
     assert flight.mission.plan(goal) == (False, "refused: not while disarmed")
+    flight.assert_smooth()
+
+
+def line(now):
+    rows = [now + np.array(offset) for offset in ((0, 0, 0), (0.5, 0, 0), (0.5, 0.5, 0))]
+    return base([0.0, 3.0, 6.0], rows)
+
+
+@pytest.mark.parametrize("every", [5, 100])
+@pytest.mark.parametrize(
+    "goal",
+    [
+        lambda now: GoalPose(now + np.array([1.0, 0.5, 0.2]), 0.3),
+        lambda now: GoalPose(np.array([1.0, 0.5, np.nan])),
+        line,
+        lambda now: arm([0.0, 3.0], [(0.0, np.pi / 2), (0.3, 1.2)]),
+        lambda now: base([4.0], [now + np.array([0.4, 0.0, 0.1])]),
+    ],
+)
+def test_a_goal_sent_again_changes_nothing(goal, every):
+    flights = Flight("hover"), Flight("hover")
+    for flight in flights:
+        flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)
+    made = goal(flights[0].state[CHI, :3])
+    for flight in flights:
+        assert flight.mission.plan(made)[0]
+        flight.step(1)
+    for i in range(1500):
+        if i % every == 0:
+            accepted, text = flights[0].mission.plan(dataclasses.replace(made))
+            assert accepted, text
+        for flight in flights:
+            flight.step(1)
+    np.testing.assert_array_equal(*(np.array(flight.references) for flight in flights))
+    assert flights[0].mission.output.state is State.HOLDING
+    assert [one.event for one in flights[0].mission.changes] == [
+        one.event for one in flights[1].mission.changes
+    ]
+    assert text == "accepted: at the end in 0.0 s"
+
+
+def test_a_closed_trajectory_is_flown_again_after_its_end_and_a_stopped_goal_too():
+    flight = Flight("hover")
+    flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)
+    now = flight.state[CHI, :3].copy()
+    lap = base([0.0, 2.0, 4.0], [now, now + np.array([0.3, 0.0, 0.0]), now])
+    for _ in range(2):
+        assert flight.mission.plan(lap)[0]
+        flight.step(200)
+        assert flight.state[CHI, 0] > now[0] + 0.2
+        flight.until(lambda output: output.state is State.HOLDING)
+    goal = GoalPose(now + np.array([1.0, 0.0, 0.0]))
+    assert flight.mission.plan(goal)[0]
+    flight.step(100)
+    assert flight.mission.request(OperatorCommand.HOLD)[0]
+    flight.step(400)
+    assert flight.mission.plan(goal)[0]
+    flight.until(lambda output: output.state is State.HOLDING and output.cause == "goal reached")
+    np.testing.assert_allclose(flight.state[CHI, :3], goal.position)
+    flight.assert_smooth()
+
+
+def test_goals_that_move_are_flown_as_one_goal_with_one_transition():
+    """Faster than the ticks, too: only the newest counts."""
+    flight = Flight("hover")
+    flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)
+    before, now = len(flight.mission.changes), flight.state[CHI, :3].copy()
+    for i in range(500):
+        for part in (0.0, 0.5):
+            ahead = np.array([0.5 + 0.002 * (i + part), 0.0, 0.0])
+            assert flight.mission.plan(GoalPose(now + ahead))[0]
+        flight.step(1)
+    assert flight.state[1, 0] == pytest.approx(0.2, abs=0.02)
+    assert [one.event for one in flight.mission.changes[before:]] == [Event.GOAL]
+    flight.until(lambda output: output.state is State.HOLDING)
+    assert flight.state[CHI, 0] == pytest.approx(now[0] + 1.499)
     flight.assert_smooth()
 
 

@@ -90,6 +90,7 @@ class Mission:
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters
         self._requests: deque[tuple[OperatorCommand, GoalPose | Points | None]] = deque()
+        self.plans_flown = 0  # in this flight
         self._guidance: Guidance | None = None
         self._watch: PayloadWatch | None = None
         self._over = ""  # why the mission lands before its end
@@ -218,9 +219,12 @@ class Mission:
             seen = self._observe(stamp, state, armed_since, readings or Readings())
             seen.authority, self._seen = authority or NOBODY, seen
             command, goal = self._requests.popleft() if self._requests else (None, None)
+            moved = False  # a goal on the way to another one is no transition
+            if command is OperatorCommand.GOAL and output.state is State.FLYING:
+                moved = guidance.planned and not seen.arrived
             changes = self._supervisor.changes
             before = len(changes)
-            decision = self._supervisor.step(stamp, seen, command)
+            decision = self._supervisor.step(stamp, seen, None if moved else command)
             if guidance is not None:
                 guidance.write(stamp)
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
@@ -229,8 +233,9 @@ class Mission:
                 if output.state is State.RELEASED:
                     guidance.follow(stamp, state)
                 event = changes[-1].event if len(changes) > before else None
-                if event is Event.GOAL:
+                if event is Event.GOAL or (moved and event is None):
                     guidance.fly(stamp, goal.plan(stamp, guidance.motion, self._parameters))
+                    self.plans_flown += 1
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
             self._follow(stamp, decision)
@@ -289,7 +294,8 @@ class Mission:
         """Check a goal or trajectory; queue it for the next step if it can be flown.
 
         It replaces the path or the plan before it. At its end the mission holds until a command.
-        Returns whether it is accepted, and the length of the plan or the reason of the refusal.
+        A goal equal to the one that is flown or reached changes nothing. Returns whether it is
+        accepted, and the length of the plan or the reason of the refusal.
         """
         if self._seen is None:
             return False, "refused: no state of the vehicle yet"
@@ -297,15 +303,23 @@ class Mission:
         if refusal:
             return False, f"refused: {refusal}"
         parameters, motion = self._parameters, self._guidance.motion
-        try:
-            goal.check(motion, parameters)
-            made = goal.plan(self._stamp, motion, parameters)
-            check(made, parameters, self._ground)
-        except PlanRefused as error:
-            hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
-            return False, f"refused: {error}{hint}"
-        self._requests.append((OperatorCommand.GOAL, goal))
-        return True, f"accepted: at the end in {made.end - self._stamp:.1f} s"
+        made = self._guidance.on_way_to(goal, self._stamp)
+        if made is None:
+            try:
+                goal.check(motion, parameters)
+                made = goal.plan(self._stamp, motion, parameters)
+                check(made, parameters, self._ground)
+            except PlanRefused as error:
+                hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
+                return False, f"refused: {error}{hint}"
+            self._ask_for(goal)
+        return True, f"accepted: at the end in {max(0.0, made.end - self._stamp):.1f} s"
+
+    def _ask_for(self, goal: GoalPose | Points) -> None:
+        """Queue a goal for the next step, in place of one that waits for it."""
+        columns = goal.columns
+        waiting = (one for one in self._requests if one[1] is None or one[1].columns != columns)
+        self._requests = deque([*waiting, (OperatorCommand.GOAL, goal)])
 
     def preview(self, step: float, longest: float) -> tuple[np.ndarray, np.ndarray]:
         """Return stamps (m,) [s] and planned chi (m, 6 + n), every `step` [s]; m = 0 on the ground.

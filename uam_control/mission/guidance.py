@@ -31,7 +31,7 @@ from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.segments import Segment, WayBack
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion
-from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan
+from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, GoalPose, Plan, Points
 from uam_control.mission.scenarios.route import SINK
 
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
@@ -173,6 +173,11 @@ class Guidance:
     def planned(self) -> bool:
         """Return whether a plan is flown, or held after its end, in place of the path."""
         return bool(self._plans) and self._last is None
+
+    def on_way_to(self, goal: GoalPose | Points, stamp: float) -> Plan | None:
+        """Return the plan that leads to an equal goal already, None without one."""
+        plan = self._plans.get(goal.columns is BASE) if self._last is None else None
+        return plan if plan is not None and plan.leads_to(goal, stamp) else None
 
     def arrived(self, stamp: float) -> bool:
         """Return whether every plan is at its end at `stamp` [s]; False without a plan."""

@@ -8,7 +8,7 @@ so the sum has no jump in value, rate or acceleration.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from uam_control.mission.motion.quintics import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
 PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
+LONGER = 1.01  # precision of a blend's length
+TINY = 1e-9  # [m/s]
+SAME = 1e-3  # [m, rad, s or their rates] by which equal goals may differ
 HARDEST = 5.7735  # its largest acceleration, times length / duration^2
 RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
 AT_REST = 1e-3  # [m/s or rad/s] rate of a last point that counts as zero
@@ -44,14 +47,19 @@ class Plan:
     """
 
     def __init__(
-        self, stamp: float, times: np.ndarray, points: np.ndarray, blend: Blend, columns: slice
+        self,
+        stamp: float,
+        times: np.ndarray,
+        points: np.ndarray,
+        blend: Blend,
+        goal: GoalPose | Points,
     ) -> None:
         """stamp [s]: of the start. times (m,) [s] from there, increasing from 0, m at least 2.
 
-        points (3, m, k): values, rates and accelerations; the last point is at rest. columns: the k
-        columns of the reference that the plan writes.
+        points (3, m, k): values, rates and accelerations; the last point is at rest. goal: that the
+        plan leads to, with the k columns of the reference that the plan writes.
         """
-        self.columns = columns
+        self.columns, self._goal = goal.columns, goal
         self._stamp, self._times, self._points = stamp, times, points
         lengths = np.diff(times)[:, None]
         self._powers = quintic(points[:, :-1], points[:, 1:], lengths)
@@ -64,8 +72,17 @@ class Plan:
     @property
     def end(self) -> float:
         """The stamp [s] from which on the plan is at rest."""
-        stopped = self._clock.goal == 0.0
-        return self._clock.settled if stopped else self._stamp + self._length
+        return self._clock.settled if self._stopped else self._stamp + self._length
+
+    @property
+    def _stopped(self) -> bool:
+        return self._clock.goal == 0.0
+
+    def leads_to(self, goal: GoalPose | Points, stamp: float) -> bool:
+        """Return whether an equal goal at `stamp` [s] changes nothing."""
+        if self._stopped or type(goal) is not type(self._goal) or not goal.equals(self._goal):
+            return False
+        return stamp < self.end or not goal.closed
 
     def stop(self, stamp: float, length: float) -> None:
         """Slow down to a stop on the curve within `length` [s] from `stamp` [s] on.
@@ -122,15 +139,24 @@ class Blend:
 
     @property
     def stop(self) -> np.ndarray:
-        """The values (k,) at which a motion stops within the blend's length."""
-        return self.start[CHI] + self.start[CHI_DOT] * self.length / 2
+        """The values (k,) at which a motion stops within the blend's length; cubic in its rate."""
+        value, rate, acceleration = self.start
+        return value + rate * self.length / 2 + acceleration * self.length**2 / 12
 
+    def way(self, goal: np.ndarray, mean: float, brake: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return times (m,) and points (3, m, k) of the straight way from the stop to goal (k,).
 
-def at_rest(stamp: float, blend: Blend, values: np.ndarray, columns: slice) -> Plan:
-    """Return the plan that goes to `values` (k,) within the blend's length."""
-    points = np.zeros((3, 2, len(values)))
-    points[CHI] = values
-    return Plan(stamp, np.array([0.0, blend.length]), points, blend, columns)
+        The rate changes within the blend's length to the way / mean [s], and within brake [s] to
+        zero. So the sum of way and blend has the present rate, then that of the way: a goal that
+        replaces another one does not brake.
+        """
+        rate, begin = (goal - self.stop) / mean, mean + (self.length - brake) / 2
+        times = np.array([0.0, self.length, begin, begin + brake])
+        points = np.zeros((3, 4, len(goal)))
+        points[CHI] = self.stop, self.stop + rate * self.length / 2, goal - rate * brake / 2, goal
+        points[CHI_DOT, 1:3] = rate
+        apart = np.append(True, np.diff(times) > MIN_STEP / 2)
+        return times[apart], points[:, apart]
 
 
 @dataclass(frozen=True)
@@ -142,6 +168,14 @@ class GoalPose:
 
     position: np.ndarray
     yaw: float = math.nan
+    columns, closed = BASE, False  # closed: whether it ends where it begins, to be flown again
+
+    def equals(self, other: GoalPose) -> bool:
+        """Return whether both are the same place, with the same coordinates left open."""
+        turn = self.yaw - other.yaw
+        near = np.allclose(self.position, other.position, 0.0, SAME, equal_nan=True)
+        both_open = math.isnan(self.yaw) and math.isnan(other.yaw)
+        return near and (both_open or abs(wrap_angle(turn)) <= SAME)
 
     def check(self, reference: np.ndarray, p: MissionParameters) -> None:
         """Raise PlanRefused for coordinates that are no numbers."""
@@ -151,22 +185,25 @@ class GoalPose:
 
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
         """Return the plan from reference (3, 6 + n) at `stamp` [s]."""
-        blend = Blend.of(reference, BASE, p)
-        start, goal = blend.stop, blend.stop.copy()
-        given = np.isfinite(self.position)
-        goal[:3][given] = self.position[given]
-        if not math.isnan(self.yaw):
-            goal[YAW] = start[YAW] + wrap_angle(self.yaw - start[YAW])
-        way, turn = float(np.linalg.norm(goal[:3] - start[:3])), abs(goal[YAW] - start[YAW])
-        length = max(
-            blend.length,
-            PEAK * way / p.goal_speed,
-            math.sqrt(HARDEST * way / p.stop_acceleration),
-            PEAK * turn / p.goal_yaw_rate,
-        )
-        points = np.zeros((3, 2, len(goal)))
-        points[CHI] = start, goal
-        return Plan(stamp, np.array([0.0, length]), points, blend, BASE)
+        blend, needed = Blend(reference[: CHI_DDOT + 1, BASE].copy(), 0.0), p.stop_time
+        while needed > LONGER * blend.length:  # until the velocity changes gently enough
+            blend = replace(blend, length=needed)
+            start, goal = blend.stop, blend.stop.copy()
+            given = np.isfinite(self.position)
+            goal[:3][given] = self.position[given]
+            if not math.isnan(self.yaw):
+                goal[YAW] = start[YAW] + wrap_angle(self.yaw - start[YAW])
+            way, turn = float(np.linalg.norm(goal[:3] - start[:3])), abs(goal[YAW] - start[YAW])
+            # without a cruise: mean * speed = way, for a brake of stop_time, and a longer one
+            steep, begin = RAMP / p.stop_acceleration, blend.length
+            shortest = 2.0 * way / (begin + p.stop_time)
+            longest = (math.sqrt(begin**2 + 8.0 * steep * way) - begin) / (2.0 * steep)
+            speed = min(p.goal_speed, shortest, longest)
+            brake = max(p.stop_time, steep * speed)
+            mean = max((begin + brake) / 2, way / max(speed, TINY), turn / p.goal_yaw_rate)
+            change = (goal[:3] - start[:3]) / mean - blend.start[CHI_DOT, :3]
+            needed = max(p.stop_time, steep * float(np.linalg.norm(change)))
+        return Plan(stamp, *blend.way(goal, mean, brake), blend, self)
 
 
 @dataclass(frozen=True)
@@ -181,6 +218,19 @@ class Points:
     points: np.ndarray
     columns: slice
 
+    def equals(self, other: Points) -> bool:
+        """Return whether both are the same trajectory."""
+        if self.points.shape != other.points.shape:
+            return False
+        pairs = ((self.times, other.times), (self.points, other.points))
+        return all(np.allclose(a, b, 0.0, SAME, equal_nan=True) for a, b in pairs)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it ends where it begins: sent again after its end it is flown again."""
+        ends = self.points[CHI, 0], self.points[CHI, -1]
+        return len(self.times) > 1 and np.allclose(*ends, 0.0, SAME)
+
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
         """Return the plan from reference (3, 6 + n) at `stamp` [s].
 
@@ -192,14 +242,20 @@ class Points:
             yaw = np.unwrap(points[CHI, :, YAW])
             present = blend.start[CHI, YAW]
             points[CHI, :, YAW] = yaw + wrap_angle(yaw[0] - present) - (yaw[0] - present)
+        if len(times) == 1:
+            length = max(times[0], 2.0 * MIN_STEP) if times[0] else 2.0 * blend.length
+            blend = replace(blend, length=min(blend.length, length / 2))
+            way = blend.way(points[CHI, 0], length - blend.length, blend.length)
+            return Plan(stamp, *way, blend, self)
         if times[0] > 0.0:
             first = np.zeros((3, 1, points.shape[2]))
-            first[CHI, 0] = blend.stop
+            if times[0] > blend.length:
+                first[CHI, 0] = blend.stop
+            else:
+                blend, first[:, 0] = replace(blend, length=times[0]), blend.start
             times, points = np.append(0.0, times), np.concatenate([first, points], axis=1)
-        if len(times) == 1:
-            return at_rest(stamp, blend, points[CHI, 0], self.columns)
-        _differences(times, points)
-        return Plan(stamp, *_stopped(times, points, p), blend, self.columns)
+        _differences(times, points, blend.start)
+        return Plan(stamp, *_stopped(times, points, p), blend, self)
 
     def check(self, reference: np.ndarray, p: MissionParameters) -> None:
         """Raise PlanRefused for bad times and numbers, or a first point far from the reference.
@@ -245,13 +301,17 @@ MIN_STEP = 0.004  # [s] shortest time between two points
 MOST_POINTS = 500  # of a trajectory; the check of more takes longer than a tick
 
 
-def _differences(times: np.ndarray, points: np.ndarray) -> None:
-    """Replace rows of points (3, m, k) that are NaN by central differences, zero at the ends."""
+def _differences(times: np.ndarray, points: np.ndarray, start: np.ndarray) -> None:
+    """Replace rows of points (3, m, k) that are NaN by central differences.
+
+    Those of the first point by the present reference's, start (3, k); zero at the end.
+    """
     for row in (CHI_DOT, CHI_DDOT):
         missing = np.isnan(points[row]).any(axis=1)
         slopes = np.zeros_like(points[row])
         if len(times) > 2:
             slopes[1:-1] = np.gradient(points[row - 1], times, axis=0)[1:-1]
+        slopes[0] = start[row]
         points[row, missing] = slopes[missing]
 
 

@@ -291,10 +291,11 @@ class MissionNode(UamNode):
         After a change, and once half of a path is flown.
         """
         part = int(2.0 * self._stage.time / PATH_LENGTH)
-        plan = f"{len(self._mission.changes)} {self._mission.output.state} {part}"
+        mission = self._mission
+        plan = f"{len(mission.changes)} {mission.plans_flown} {mission.output.state} {part}"
         if plan != self._path_of and self._path.get_subscription_count():
             self._path_of = plan
-            stamps, chi = self._mission.preview(PATH_STEP, PATH_LENGTH)
+            stamps, chi = mission.preview(PATH_STEP, PATH_LENGTH)
             self._path.publish(path_message(stamp, np.rint(stamps * SECOND).astype(int), chi))
 
     def _publish_answer(self) -> None:

@@ -6,8 +6,9 @@
 | `base_trajectory` | trajectory_msgs/MultiDOFJointTrajectory | fly a trajectory of the base |
 | `arm_trajectory` | trajectory_msgs/JointTrajectory | move the arm along a trajectory |
 
-The answer is a line in the log, an entry in /diagnostics, and `answers` (how many goals and
-trajectories were answered) with `answer` (the newest) in the mission status.
+The answer is a line in the log (at most one accepted and one refused per second and topic), an
+entry in /diagnostics, and `answers` (how many goals and trajectories were answered) with `answer`
+(the newest) in the mission status.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,6 +19,8 @@ from uam_control.nodes.planner_messages import read_arm_trajectory, read_base_tr
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.node.base_node import UamNode
+
+LOG_PERIOD = 1_000_000_000  # [ns] from one line of a topic's answers to the next
 
 
 class PlannerInputs:
@@ -34,18 +37,24 @@ class PlannerInputs:
         self._take(topics.ARM_TRAJECTORY, lambda data: read_arm_trajectory(data, joints))
 
     def _take(self, topic: topics.Topic, read: Callable[[bytes], GoalPose | Points]) -> None:
+        logged: dict[bool, int] = {}  # accepted → stamp of the newest line
+
         def handle(data: bytes) -> None:
             try:
                 accepted, text = self._mission.plan(read(data))
             except BadMessage as error:
                 accepted, text = False, f"refused: {error}"
             self.answers, self.answer = self.answers + 1, f"{topic.name}: {text}"
+            self._publish()
+            now = self._node.stamp
+            if accepted in logged and 0 <= now - logged[accepted] < LOG_PERIOD:
+                return  # a stream of goals
+            logged[accepted] = now
             log = self._node.get_logger()
             # two calls: rclpy requires one severity per line of code
             if accepted:
                 log.info(self.answer)
             else:
                 log.warning(self.answer)
-            self._publish()
 
         self._node.listen(topic, handle, required=False, qos=topic.qos, raw=True)
