@@ -167,11 +167,49 @@ def test_arm_angles_are_flown(tmp_path):
             },
             "line 3 column alpha_2: joint angle beyond its range, -2.09 to 2.09 rad",
         ),
+        ({"header": "t,px,py,pz", "rows": ["0,0,0,1", "1,1,0,0,1"]}, "line 3: 5 fields, .* has 4"),
+        ({"header": "t,px,py,pz", "rows": ["0,0,0,1", "1,0,1"]}, "line 3: 3 fields, .* has 4"),
+        ({"header": "\n\nt,px,py,pz", "rows": ["0,0,0,1", "", " ", "1,0,0,x"]}, "line 7 column pz"),
+        ({"header": "\nt,px,py,pz", "rows": ["0,0,0,1", "1,0,0"]}, "in line 2 has 4"),
+        (
+            {"header": "t;px;py;pz", "rows": ["0;0;0;1"]},
+            "line 1: ';' separates the columns; commas",
+        ),
+        ({"header": "t\tpx\tpy\tpz", "rows": []}, "line 1: a tab separates the columns"),
+        ({"header": "", "rows": []}, "empty; a header expected"),
+        ({"header": 't,"px', "rows": []}, "line 2: not valid CSV: unexpected end of data"),
+        ({"header": "t,px,py,pz,u_1,u_1", "rows": []}, "line 1: column u_1 is there twice"),
+        (
+            {"header": "t,px,py,pz", "rows": ["0,0,0,1", "5e6,0,0,1"]},
+            "column t: 5e[+]06 s, or 1.39e[+]03 h, is too long: 3600 s is possible; .* seconds",
+        ),
     ],
 )
 def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
     with pytest.raises(ScenarioError, match=reason):
         load_scenario(csv_file(tmp_path, **changes))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("µs", 1e6)])
+def test_times_in_another_unit_show_in_the_velocities(tmp_path, unit, factor):
+    times = np.linspace(0.0, 3.0, 31)
+    if unit == "µs":
+        times = times / 1e3  # 3 ms: in µs as short as the flight of the other case
+    speed = 1.0 if unit == "ms" else 1e3
+    rows = [f"{t * factor:.6f},{speed * t:.6f},0,1,{speed},0,0" for t in times]
+    file = csv_file(tmp_path, header="t,px,py,pz,vx,vy,vz", rows=rows)
+    with pytest.raises(ScenarioError, match=f"line 1: t is in {unit}, .*; seconds expected"):
+        load_scenario(file)
+
+
+def test_a_byte_order_mark_spaces_and_an_upper_case_ending_are_read(tmp_path):
+    text = "t, px, py, pz\n0, 0, 0, 1\n\n1, 0, 0, 1\n"
+    scenarios = []
+    for name, encoding in (("plain.csv", "utf-8"), ("marked.CSV", "utf-8-sig")):
+        (tmp_path / name).write_text(text, encoding=encoding)
+        scenarios.append(load_scenario(str(tmp_path / name)))
+    plain, marked = (one.route.path.last for one in scenarios)
+    np.testing.assert_array_equal(plain, marked)
 
 
 def test_a_file_that_is_no_utf_8_is_refused(tmp_path):

@@ -165,7 +165,10 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
     [
         ("t,x,y,\xff\n", "not a text in UTF-8"),
         ("t,x,y\n1,2,3\n", "no column z, qw, qx, qy, qz"),
-        ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,1,0,0,zero\n", "line 2: not a number"),
+        (
+            "t,x,y,z,qw,qx,qy,qz\n1,2,3,4,1,0,0,zero\n",
+            "line 2 column qz: 'zero' is not a finite number",
+        ),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,0,0,0,0\n", "line 2: not a pose"),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,1,0,0,0\n1,2,3,4,1,0,0,0\n", "line 3: t does not grow"),
     ],

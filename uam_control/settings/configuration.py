@@ -59,7 +59,7 @@ def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     if given.is_file():
         return given
     kind = folder.rstrip("s")
-    if given.suffix in SUFFIXES or len(given.parts) > 1:
+    if given.suffix.lower() in SUFFIXES or len(given.parts) > 1:
         raise ConfigurationError(f"{kind} file {name} does not exist")
     for suffix in suffixes:
         found = root() / folder / (name + suffix)

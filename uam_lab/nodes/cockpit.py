@@ -6,12 +6,11 @@ import time
 from dataclasses import dataclass
 
 import rclpy
-import yaml
 from rclpy.node import Node
 
 from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
-from uam_control.settings import configuration
+from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, integer, text
 from uam_lab.cockpit import web
 from uam_lab.cockpit.frame_rate import FrameRate
@@ -45,7 +44,7 @@ def main() -> int:
     node = begin(NAME)
     if node is None:
         return REFUSED
-    options = yaml.safe_load(configuration.path(OPTIONS).read_text())
+    options = yaml_file.read(configuration.path(OPTIONS), configuration.ConfigurationError)
     try:
         served = NodeParameters(node, CockpitParameters, read_only=True).current
         vehicle = described_vehicle(node)

@@ -15,8 +15,6 @@ body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and
 
 from __future__ import annotations
 
-import csv
-import math
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +24,16 @@ from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 from uam_control.mission.scenarios.open_gaps import worst_swing
 from uam_control.mission.scenarios.route import Route, with_ramps
-from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario import (
+    LONGEST_FILE,
+    Landing,
+    Scenario,
+    ScenarioError,
+    check_length,
+    standing,
+)
 from uam_control.mission.scenarios.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
+from uam_control.settings.csv_table import CsvTable
 from uam_control.vehicle import VehicleDescription
 
 AXES = "xyz"
@@ -44,6 +50,7 @@ AGILICIOUS = {f"{k}_{a}": f"{k}{a}" for k in "pv" for a in AXES}
 AGILICIOUS |= {f"a_lin_{a}": f"a{a}" for a in AXES} | {f"q_{a}": f"q{a}" for a in "wxyz"}
 NOT_USED = {f"{k}_{a}" for k in ("w", "a_rot", "jerk", "snap") for a in AXES}
 NOT_USED |= {f"w{a}" for a in AXES} | {f"u_{i}" for i in range(1, 5)}
+OTHER_UNITS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}  # of t [s]
 PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
 UNIT = 0.02  # largest deviation of a quaternion's norm from 1
 # rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
@@ -55,7 +62,7 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
 
     Raises ScenarioError with line and column.
     """
-    table = _Table.read(file, len(vehicle.joints))
+    table = _Table(file, len(vehicle.joints))
     times = table.times - table.times[0]
     notes: list[str] = []
     path = _path(table, times, vehicle, notes)
@@ -75,31 +82,22 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
 class _Table:
     """Numbers of a file: `columns` by their own names; errors name the file's."""
 
-    def __init__(self, file: Path, names: dict[str, str], numbers: np.ndarray) -> None:
-        self.file, self._names = file, list(names)
-        self._written, self._numbers = names, numbers
-
-    @classmethod
-    def read(cls, file: Path, joints: int) -> _Table:
+    def __init__(self, file: Path, joints: int) -> None:
         """Read and check the header and the numbers."""
-        try:
-            rows = csv.DictReader(file.read_text().splitlines())
-        except UnicodeDecodeError:
-            raise ScenarioError(f"{file}: not a text in UTF-8") from None
-        header = [name.strip() for name in rows.fieldnames or []]
-        rows.fieldnames = header
-        names = _names(file, header, joints)
-        numbers = np.array([_numbers(file, i, row, names) for i, row in enumerate(rows, start=2)])
-        if len(numbers) < 2:
-            raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
-        table = cls(file, names, numbers)
-        backward = np.flatnonzero(np.diff(table.times) <= 0.0)
+        self.file = file
+        self._table = CsvTable(file, ScenarioError)
+        self._written = _names(self._table, joints)
+        self._names = list(self._written)
+        self._numbers = np.array(self._table.numbers(self._written.values()))
+        if len(self._numbers) < 2:
+            raise ScenarioError(f"{file}: at least two rows expected, got {len(self._numbers)}")
+        backward = np.flatnonzero(np.diff(self.times) <= 0.0)
         if len(backward):
-            raise table.error(int(backward[0]) + 1, "t", "time does not increase")
-        low = table.columns("position")[:, Z] <= 0.0
+            raise self.error(int(backward[0]) + 1, "t", "time does not increase")
+        check_length(self.times[-1] - self.times[0], f"{file}: column t", LONGEST_FILE)
+        low = self.columns("position")[:, Z] <= 0.0
         if low.any():
-            raise table.error(int(np.argmax(low)), "pz", "below the ground")
-        return table
+            raise self.error(int(np.argmax(low)), "pz", "below the ground")
 
     @property
     def times(self) -> np.ndarray:
@@ -121,54 +119,51 @@ class _Table:
     def error(self, row: int, column: str, text: str) -> ScenarioError:
         """Return the error of a row, counted from 0."""
         name = self._written.get(column, column)  # a column that the file may leave out
-        return ScenarioError(f"{self.file} line {row + 2} column {name}: {text}")
+        return self._table.error(self.line(row), text, name)
+
+    def line(self, row: int) -> int:
+        """Return the line of a row, counted from 0."""
+        return self._table.lines[row]
+
+    def header_error(self, text: str) -> ScenarioError:
+        """Return the error of the header."""
+        return self._table.error(self._table.header_line, text)
 
     def _column(self, name: str) -> np.ndarray:
         return self._numbers[:, self._names.index(name)]
 
 
-def _names(file: Path, header: list[str], joints: int) -> dict[str, str]:
+def _names(table: CsvTable, joints: int) -> dict[str, str]:
     """Return our name → name in the file, of the columns in use; raise ScenarioError."""
+
+    def refused(text: str) -> ValueError:
+        return table.error(table.header_line, text)
+
     arm = arm_coordinates(joints)
     groups = {**GROUPS, "arm": arm}
     known = {"t"}.union(*groups.values())
     found: dict[str, str] = {}
-    for written in header:
+    for written in table.header:
         name = AGILICIOUS.get(written, written)
         if name in found:
-            raise ScenarioError(f"{file} line 1: column {written} is there twice")
+            raise refused(f"column {written} is there twice")
         if name in known:
             found[name] = written
         elif written not in NOT_USED:
             allowed = ",".join(["t", *(name for group in groups.values() for name in group)])
-            raise ScenarioError(f"{file} line 1: column {written!r} is unknown; known: {allowed}")
+            raise refused(f"column {written!r} is unknown; known: {allowed}")
     for group, names in groups.items():
         missing = [name for name in names if name not in found]
         if not missing or (len(missing) == len(names) and group != "position"):
             continue
         there = [name for name in names if name in found]
         beside = f" beside {there[0]}" if there else ""
-        raise ScenarioError(f"{file} line 1: column {', '.join(missing)} is missing{beside}")
+        raise refused(f"column {', '.join(missing)} is missing{beside}")
     if "t" not in found:
-        raise ScenarioError(f"{file} line 1: column t is missing")
+        raise refused("column t is missing")
     if "yaw" in found and "qw" in found:
-        raise ScenarioError(f"{file} line 1: column yaw beside {found['qw']}: only one is possible")
+        raise refused(f"column yaw beside {found['qw']}: only one is possible")
     return found
-
-
-def _numbers(file: Path, line: int, row: dict, names: dict[str, str]) -> list[float]:
-    numbers = []
-    for written in names.values():
-        try:
-            value = float(row[written])
-        except (TypeError, ValueError):
-            value = math.nan
-        if not math.isfinite(value):
-            raise ScenarioError(
-                f"{file} line {line} column {written}: {row[written]!r} is not a finite number"
-            )
-        numbers.append(value)
-    return numbers
 
 
 def _path(
@@ -178,11 +173,14 @@ def _path(
     velocity, acceleration = table.columns("velocity"), table.columns("acceleration")
     position = table.columns("position")
     if acceleration is not None and velocity is None:
-        raise ScenarioError(f"{table.file} line 1: ax, ay, az need vx, vy, vz beside them")
+        raise table.header_error("ax, ay, az need vx, vy, vz beside them")
     if acceleration is not None and not _fits(times, velocity, acceleration):
         notes.append(f"{table.file.name}: ax, ay, az do not fit vx, vy, vz and are not used")
         acceleration = None
     if velocity is not None and not _fits(times, position, velocity, acceleration):
+        for unit, seconds in OTHER_UNITS.items():
+            if _fits(seconds * times, position, velocity):
+                raise table.header_error(f"t is in {unit}, as vx, vy, vz show; seconds expected")
         notes.append(f"{table.file.name}: vx, vy, vz do not fit px, py, pz and are not used")
         velocity = acceleration = None
     yaw, turning = _yaw(table), table.columns("yaw rate")
@@ -231,8 +229,8 @@ def _check_gaps(
     raise table.error(
         swing.row + 1,
         names[swing.column],
-        f"{apart:.3g} s after line {swing.row + 2}, and the smooth curve swings out of the two "
-        f"rows by {swing.distance:.2g} {unit}; give rows between them",
+        f"{apart:.3g} s after line {table.line(swing.row)}, and the smooth curve swings out of the "
+        f"two rows by {swing.distance:.2g} {unit}; give rows between them",
     )
 
 

@@ -13,6 +13,7 @@ from uam_control.mission.scenarios import curves
 from uam_control.mission.scenarios.curves import Harmonic
 from uam_control.mission.scenarios.minimum_snap import minimum_snap, shares
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY, Leg
+from uam_control.mission.scenarios.scenario import check_length
 from uam_control.settings.section import Section
 
 TANGENT = "tangent"
@@ -26,6 +27,7 @@ CURVE_KEYS = (
 SHAPES = {"circle": ("radius",), "ellipse": ("size",), "lemniscate": ("size",)}
 WAYPOINT_KEYS = ("kind", "points", "times", "speed", "duration", "laps", "yaw_deg", "arm_deg", "at")
 KINDS = (*SHAPES, "waypoints")
+MOST = 10_000  # laps, points of all laps, cycles of a joint in all: what memory is made for
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def _curve(entry: Section, kind: str, middle: Middle) -> tuple[Leg, ...]:
     tangent = entry.values.get("yaw") == TANGENT
     if "yaw" in entry.values and not tangent:
         raise entry.error("yaw", f"{entry.values['yaw']!r}, allowed: {TANGENT}; or yaw_deg")
-    laps = entry.positive("laps") if "laps" in entry.values else 1.0
+    laps = _laps(entry)
     per_lap = entry.number("yaw_turns") / laps if "yaw_turns" in entry.values else 0.0
     if tangent and {"yaw_deg", "yaw_turns"} & entry.values.keys():
         raise entry.error("yaw", "tangent, and yaw_deg or yaw_turns: only one is possible")
@@ -90,6 +92,14 @@ def _cut(path: Polynomials, ramp: float) -> tuple[Leg, ...]:
         for name, (a, b) in zip((RUN_UP, TRAJECTORY, RUN_OUT), parts, strict=True)
         if b > a
     )
+
+
+def _laps(entry: Section, points: int = 1) -> float:
+    """Return `laps`, 1 without; points: of one lap."""
+    laps = entry.positive("laps") if "laps" in entry.values else 1.0
+    if laps * points > MOST:
+        raise entry.error("laps", f"{laps:g}: at most {MOST // points} are possible")
+    return laps
 
 
 def _shape(entry: Section, kind: str) -> tuple[Harmonic, ...]:
@@ -127,7 +137,10 @@ def _sweeps(entry: Section, middle: Middle) -> tuple[Harmonic, ...]:
         low, high = angles.copy(), angles.copy()
         low[i], high[i] = angles[i] - abs(amplitude), angles[i] + abs(amplitude)
         _check_joints(one, "amplitude_deg", low, high, middle)
-        found.append(Harmonic(ALPHA + i, amplitude, float(one.positive("cycles"))))
+        cycles, most = one.positive("cycles"), MOST / _laps(entry)
+        if cycles > most:
+            raise one.error("cycles", f"{cycles:g}: at most {most:g} per lap are possible")
+        found.append(Harmonic(ALPHA + i, amplitude, cycles))
     return tuple(found)
 
 
@@ -151,12 +164,14 @@ def _timing(entry: Section, shape: tuple[Harmonic, ...], laps: float) -> tuple[P
     if given[0] == "duration":
         if "ramp" in entry.values:
             raise entry.error("ramp", "only with period or speed; duration is from rest to rest")
+        check_length(entry.positive("duration"), entry.where)
         return curves.swept(laps, entry.positive("duration")), 0.0
     slope = curves.largest_slope(shape)
     if given[0] == "speed":
         period = curves.TURN * slope / entry.positive("speed")
     else:
         period = entry.positive("period")
+    check_length(laps * period, entry.where)
     peak = curves.TURN * slope / period
     default = max(DEFAULT_RAMP, SMOOTHSTEP * peak / RAMP_ACCELERATION)
     ramp = entry.positive("ramp") if "ramp" in entry.values else default
@@ -174,7 +189,7 @@ def _waypoints(entry: Section, middle: Middle) -> tuple[Leg, ...]:
     table = np.array(entry.rows("points", width))
     if len(table) < 2:
         raise entry.error("points", "two or more expected")
-    laps = entry.positive("laps") if "laps" in entry.values else 1.0
+    laps = _laps(entry, len(table))
     if laps != round(laps):
         raise entry.error("laps", f"{laps:g}: a whole number expected")
     if laps > 1 and not np.array_equal(table[0], table[-1]):

@@ -12,11 +12,22 @@ from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
 from uam_control.mission.scenarios.route import PAUSE, SINK, Leg, Route
 from uam_control.mission.scenarios.scenario_options import LAND
 
+LONGEST = 86400.0  # [s] of a flight: more than that are times in another unit
+LONGEST_FILE = 3600.0  # [s] of a planner's trajectory: longer than a battery lasts
 STANDING = 0.285  # [m] height of the origin on the ground, before the take-off has measured it
 
 
 class ScenarioError(ValueError):
     """An invalid scenario; the text is one line: where, what is wrong, what is allowed."""
+
+
+def check_length(length: float, where: str, longest: float = LONGEST) -> None:
+    """Raise ScenarioError for a length [s] above `longest`; before arrays of it are made."""
+    if length > longest:
+        raise ScenarioError(
+            f"{where}: {length:.6g} s, or {length / 3600.0:.3g} h, is too long: {longest:g} s is "
+            "possible; give times in seconds"
+        )
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,13 @@ from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios.csv_file import from_csv
 from uam_control.mission.scenarios.reference_kinds import Middle, legs
 from uam_control.mission.scenarios.route import Route
-from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario import (
+    Landing,
+    Scenario,
+    ScenarioError,
+    check_length,
+    standing,
+)
 from uam_control.mission.scenarios.scenario_options import (
     AS_SCENARIO,
     LAND,
@@ -45,16 +51,15 @@ def load_scenario(
     """
     vehicle, options = vehicle or load_description(), options or ScenarioOptions()
     file = Path(name_or_file)
-    if file.suffix not in (".yaml", ".csv"):
+    if file.suffix.lower() not in (".yaml", ".csv"):
         try:
             file = configuration.named("scenarios", name_or_file)
         except configuration.ConfigurationError as error:
             raise ScenarioError(str(error)) from None
-    try:
-        read = from_csv if file.suffix == ".csv" else from_yaml
-        return read(file, vehicle, options).slowed(options.slowdown)
-    except OSError as error:
-        raise ScenarioError(f"{file}: {error.strerror}") from None
+    read = from_csv if file.suffix.lower() == ".csv" else from_yaml
+    scenario = read(file, vehicle, options).slowed(options.slowdown)
+    check_length(scenario.landing.at + scenario.landing.duration, f"{file}: the flight")
+    return scenario
 
 
 def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) -> Scenario:

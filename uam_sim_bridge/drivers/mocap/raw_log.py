@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from uam_control.settings.csv_table import CsvTable
 from uam_sim_bridge.drivers.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.drivers.mocap.measurement import TimedPose
 
@@ -26,26 +27,20 @@ def write(file: Path, poses: Sequence[TimedPose]) -> None:
 
 
 def read(file: Path) -> list[TimedPose]:
-    """Read the poses; raises MocapError with the line, OSError."""
-    found: list[TimedPose] = []
-    try:
-        rows = csv.DictReader(file.read_text().splitlines())
-    except UnicodeDecodeError:
-        raise MocapError(f"{file}: not a text in UTF-8") from None
-    missing = [name for name in COLUMNS if name not in (rows.fieldnames or ())]
+    """Read the poses; raises MocapError with the line."""
+    table = CsvTable(file, MocapError)
+    missing = [name for name in COLUMNS if name not in table.header]
     if missing:
-        raise MocapError(f"{file}: no column {', '.join(missing)}; needed: {','.join(COLUMNS)}")
-    for row in rows:
-        try:
-            numbers = [float(row[name]) for name in COLUMNS]
-        except (TypeError, ValueError):
-            raise MocapError(f"{file} line {rows.line_num}: not a number") from None
+        needed = f"no column {', '.join(missing)}; needed: {','.join(COLUMNS)}"
+        raise table.error(table.header_line, needed)
+    found: list[TimedPose] = []
+    for line, numbers in zip(table.lines, table.numbers(COLUMNS), strict=True):
         quaternion = np.array(numbers[4:])
         norm = math.sqrt(quaternion @ quaternion)
-        if not (all(map(math.isfinite, numbers)) and 0.9 < norm < 1.1):
-            raise MocapError(f"{file} line {rows.line_num}: not a pose")
+        if not 0.9 < norm < 1.1:
+            raise table.error(line, f"not a pose: the quaternion's norm is {norm:.3g}")
         if found and numbers[0] <= found[-1].time:
-            raise MocapError(f"{file} line {rows.line_num}: t does not grow")
+            raise table.error(line, "t does not grow")
         pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
         found.append(TimedPose(numbers[0], pose))
     return found
