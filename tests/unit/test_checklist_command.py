@@ -3,11 +3,11 @@
 import io
 
 import pytest
-from rich.console import Console
 
 from uam_lab.cli import checklist
 from uam_lab.cli.checklist_view import drawn
 from uam_lab.cli.keys import Keys
+from uam_lab.results.terminal import Terminal
 from uam_msgs_py.messages.checklist import ChecklistItem
 from uam_msgs_py.messages.status import ChecklistState
 
@@ -37,7 +37,7 @@ class Operator:
 
 
 def text(*arguments, **options):
-    console = Console(width=100, record=True, file=io.StringIO())
+    console = Terminal(width=100, record=True, file=io.StringIO())
     console.print(drawn(*arguments, **options))
     return console.export_text()
 

@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from uam_lab.cli.main import main
 from uam_lab.report.build import build_report
@@ -16,6 +15,7 @@ from uam_lab.report.figures import figures
 from uam_lab.report.page import console, flight_page
 from uam_lab.report.video import flight_video
 from uam_lab.results import timeseries
+from uam_lab.results.terminal import Terminal
 
 
 def text_of(html):
@@ -158,7 +158,7 @@ def test_a_reconstructed_law_is_labelled_and_not_compared_with_table_one(flight_
     assert "position 0, attitude 3, arm 12" in words
     out = io.StringIO()
     metrics = json.loads((flight_folder / "metrics.json").read_text())
-    Console(file=out, width=100).print(console.summary(metrics))
+    Terminal(file=out, width=100).print(console.summary(metrics))
     assert "ASMC-2 (reconstructed)" in out.getvalue()
 
 
@@ -180,7 +180,7 @@ def test_the_page_reports_a_missing_renderer(flight_folder):
 def test_the_console_shows_the_same(flight_folder):
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     out = io.StringIO()
-    Console(file=out, width=100).print(console.summary(metrics, flight_folder))
+    Terminal(file=out, width=100).print(console.summary(metrics, flight_folder))
     lines = out.getvalue().splitlines()
     assert lines[0].strip() == "Mission completed"
     pitch = next(line for line in lines if "pitch" in line)
@@ -193,7 +193,7 @@ def test_the_console_shows_the_same(flight_folder):
 
 def test_progress_without_a_terminal_is_a_line_per_kind_of_step():
     out = io.StringIO()
-    with console.reporting(Console(file=out, force_terminal=False)) as progress:
+    with console.reporting(Terminal(file=out, force_terminal=False)) as progress:
         for step in ("figure path", "figure payload", "video 4 %", "video 8 %", "page"):
             progress(step)
     assert out.getvalue().splitlines() == [

@@ -3,13 +3,13 @@
 from types import SimpleNamespace
 
 import pytest
-from rich.console import Console
 
 from uam_lab.cli import rehearse
 from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, tell
 from uam_lab.library.flight_result import FlightResult
 from uam_lab.processes.interrupts import INTERRUPTED
 from uam_lab.results.outcome import Outcome
+from uam_lab.results.terminal import Terminal
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_the_reason_goes_to_the_errors_and_the_rest_to_the_output(
     tmp_path, capsys, outcome, dry_run, status
 ):
     settings, result = SimpleNamespace(dry_run=dry_run), FlightResult(tmp_path, None, outcome)
-    assert tell(Console(), settings, result, "rehearse", False, True, ["a device"]) == status
+    assert tell(Terminal(), settings, result, "rehearse", False, True, ["a device"]) == status
     said = capsys.readouterr()
     assert said.out.startswith(f"results: {tmp_path}\na device\n")
     assert said.out.count("note: ") == len(outcome.notes)

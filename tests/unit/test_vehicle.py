@@ -11,13 +11,12 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from rich.console import Console
-
 from uam_lab.cli.main import main
 from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus
 from uam_lab.flight.progress import Progress, device_table
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.result_folder import ResultFolder
+from uam_lab.results.terminal import Terminal
 from uam_lab.vehicle import vehicle_engine, vehicle_nodes
 from uam_lab.vehicle.devices import Report, devices
 from uam_lab.vehicle.lab import Magnet
@@ -168,7 +167,7 @@ def test_only_the_drivers_may_publish_the_sensors():
 
 def test_lines_without_a_terminal_say_each_change_once():
     shown = StringIO()
-    progress = Progress(Console(file=shown, width=200))
+    progress = Progress(Terminal(file=shown, width=200))
     missing = DeviceState("arm", False, "/dev/ttyARM: does not exist", "uam arm")
     there = DeviceState("arm", True, "open", "uam arm")
     silent, still = (replace(missing, text=f"no answer for {age} s") for age in (2, 3))
@@ -182,7 +181,7 @@ def test_lines_without_a_terminal_say_each_change_once():
 
 def test_on_a_terminal_there_is_one_table_until_all_devices_are_there():
     shown = StringIO()
-    console = Console(file=shown, width=120, force_terminal=True)
+    console = Terminal(file=shown, width=120, force_terminal=True)
     missing = DeviceState("arm", False, "/dev/ttyARM: does not exist", "uam arm")
     with Progress(console) as progress:
         progress.bring_up([missing, DeviceState("imu", True, "messages on /imu/data", "hz")])

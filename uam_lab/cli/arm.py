@@ -8,11 +8,11 @@ import math
 import time
 from collections.abc import Callable
 
-from rich.console import Console
 from rich.table import Table
 
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cli.command import Command
+from uam_lab.results.terminal import Terminal, say
 from uam_lab.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_sim_bridge.drivers.dynamixel import control_table as names
 from uam_sim_bridge.drivers.dynamixel.chain import (
@@ -63,14 +63,14 @@ def run(options: argparse.Namespace) -> int:
     if options.budget:
         if driver.latency_timer is None:
             driver.latency_timer = NEEDED_LATENCY
-            print(f"no latency timer of {driver.chain.device} found: 1 ms assumed")
-        print(driver.budget.table(driver.rate))
+            say(f"no latency timer of {driver.chain.device} found: 1 ms assumed")
+        say(driver.budget.table(driver.rate))
         return AS_DESCRIBED
     try:
         driver.start()
         rows = [state(driver, i) for i in range(len(driver.chain.servos))]
     except ArmError as error:
-        print(str(error).replace("; ", "\n"))
+        say(str(error).replace("; ", "\n"))
         return OTHERWISE
     finally:
         driver.bus.close()  # and not `stop`, which would end a torque that holds the arm
@@ -79,10 +79,10 @@ def run(options: argparse.Namespace) -> int:
     )
     for row in rows:
         table.add_row(*row)
-    Console().print(table)
-    print(driver.budget.table(driver.rate))
+    Terminal().print(table)
+    say(driver.budget.table(driver.rate))
     for remark in driver.remarks:
-        print(remark)
+        say(remark)
     return AS_DESCRIBED
 
 
@@ -139,10 +139,10 @@ def scan(chain: ArmChain, wait: float) -> int:
         for speed in SPEEDS:
             bus.set_baud_rate(speed)
             for servo, (number, firmware) in bus.scan().items():
-                print(f"{speed} baud: id {servo}, {model_name(number)}, firmware {firmware}")
+                say(f"{speed} baud: id {servo}, {model_name(number)}, firmware {firmware}")
                 found += 1
     finally:
         bus.close()
     if not found:
-        print(f"{chain.device}: no servo answers: supply, cable, Protocol 2.0?")
+        say(f"{chain.device}: no servo answers: supply, cable, Protocol 2.0?")
     return AS_DESCRIBED if found else OTHERWISE

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-
-from rich.console import Console
 
 from uam_control.mission import load_scenario
 from uam_lab.budget.path import NoTicks
@@ -22,6 +19,7 @@ from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.results.atomic import write_text
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import Terminal, say
 
 MEASURED, NOT_COMPLETED = 0, 1
 SCENARIO = "shuttle.yaml"
@@ -85,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     if options.scenario is None:
         settings = _to_and_fro(settings, out, options)
     budgets, landing = [], settings.scenario.landing
-    console = Console()
+    console = Terminal()
     for layout in layouts:
         console.print(f"layout {layout}")
         with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
@@ -93,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
             try:
                 budgets.append(flown.fly(layout, flight, progress, stop))
             except (FlightFailed, NoTicks, OSError) as error:
-                print(f"uam budget: {layout}: {error}", file=sys.stderr)
+                say(f"uam budget: {layout}: {error}", error=True)
         if stop.raised:
             break
     status = INTERRUPTED if stop.raised else NOT_COMPLETED
@@ -107,8 +105,8 @@ def run(options: argparse.Namespace) -> int:
         "process": settings.process.changes(),
     }
     report.write(out, budgets, facts)
-    print(report.summary(budgets))
-    print(f"results  {out}")
+    say(report.summary(budgets))
+    say(f"results  {out}")
     whole = len(budgets) == len(layouts) and not any(one.failure for one in budgets)
     return MEASURED if whole and not stop.raised else status
 

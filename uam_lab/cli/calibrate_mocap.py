@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import Command, number
+from uam_lab.results.terminal import say
 from uam_lab.vehicle.lab import LabError
 from uam_lab.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_sim_bridge.drivers.mocap.mocap_parameters import (
@@ -152,12 +153,12 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     found: dict[str, list[TimedPose]] = {}
     try:
         live.until_known(source, body)
-        print(f"measures '{body}' of {source.description}")
+        say(f"measures '{body}' of {source.description}")
         for what, step in STEPS.items():
             _confirm(step)
             found[what] = live.measure(source, body, options.duration)
             place = measurement.still(found[what], what)
-            print(
+            say(
                 f"   {place.count} poses, spread {1e3 * place.spread:.2f} mm, "
                 f"{math.degrees(place.wobble):.2f} deg"
             )
@@ -181,14 +182,14 @@ def _confirm(step: str) -> None:
 def _say(made: Calibration, options: argparse.Namespace) -> None:
     """Print the residuals and what to do next."""
     m = made.measured
-    print(
+    say(
         f"moved {m['distance_m']:.2f} m; between the places: {m['height_difference_m']:+.4f} m "
         f"higher, tilted {m['tilt_difference_deg']:.2f} deg, turned "
         f"{m['heading_difference_deg']:+.2f} deg"
     )
-    print(
+    say(
         f"rigid body tilted {m['body_tilt_deg']:.1f} deg against the vehicle; pivot "
         f"{made.pivot[2]:+.3f} m above base_link"
     )
-    print(f"written  {options.out}")
-    print(f"use it   in the lab file: mocap: {{calibration: {options.out}}}")
+    say(f"written  {options.out}")
+    say(f"use it   in the lab file: mocap: {{calibration: {options.out}}}")

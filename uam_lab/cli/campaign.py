@@ -15,6 +15,7 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import FlightSettings, SettingsError
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import say
 
 TABLE = "flights.parquet"
 EXAMPLES = """\
@@ -90,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
     )
     before = sum(number in flown.keys for number in numbers)
     if before:
-        print(f"campaign: continuing after {before} earlier flights", flush=True)
+        say(f"campaign: continuing after {before} earlier flights")
     with Counting("campaign", len(numbers)) as counting:
         bad = 0
 
@@ -109,8 +110,8 @@ def run(options: argparse.Namespace) -> int:
     table = flown.compact()
     if len(numbers) < table.num_rows:  # the folder has more flights than this command asks for
         table = table.filter([number in numbers for number in table[trial_rows.NUMBER].to_pylist()])
-    print(campaign_report.write(out, table, vehicle.name, command_line(), _again(options)))
-    print(f"results  {out}\nreport   {out / 'report.html'}")
+    say(campaign_report.write(out, table, vehicle.name, command_line(), _again(options)))
+    say(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
 
 

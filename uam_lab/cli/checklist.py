@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from uam_lab.cli.command import Command, chosen_flight
 from uam_lab.flight.flight_settings import SettingsError, require_ros
+from uam_lab.results.terminal import Terminal, say
 
 if TYPE_CHECKING:
     from uam_lab.flight.operator import Operator
@@ -64,17 +65,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _command(operator: Operator, name: str) -> int:
     accepted, text = operator.checklist_command(name)
-    print(text)
+    say(text)
     return PASSED if accepted else OPEN
 
 
 def _show(operator: Operator) -> int:
-    from rich.console import Console
-
     from uam_lab.cli.checklist_view import drawn
 
     state, items = operator.checklist()
-    Console().print(drawn(state, items))
+    Terminal().print(drawn(state, items))
     return PASSED if state.passed else OPEN
 
 
@@ -87,7 +86,7 @@ def _live(operator: Operator) -> int:
 
     answer = ""
     state, items = operator.checklist()
-    with Keys() as keys, Live(drawn(state, items, live=True)) as live:
+    with Keys() as keys, Live(drawn(state, items, live=True), console=Terminal()) as live:
         while True:
             key = keys.pressed()
             if key == "q":

@@ -44,11 +44,11 @@ def _step(state: ChecklistState) -> Panel:
     if state.passed:
         return Panel("All items have passed: uam start is allowed.", style="green")
     if not state.step:
-        return Panel(f"Waiting for: {state.failing}", title="automatic items", style="yellow")
+        return Panel(Text(f"Waiting for: {state.failing}"), title="automatic items", style="yellow")
     lines = [Text(state.instruction, style="bold"), Text(state.seen)]
     if state.needs == "confirm":
         lines.append(Text("Confirm when it is done.", style="bold yellow"))
-    return Panel(Group(*lines), title=state.step, style="red" if state.failed else "cyan")
+    return Panel(Group(*lines), title=Text(state.step), style="red" if state.failed else "cyan")
 
 
 def _table(state: ChecklistState, items: Sequence[ChecklistItem]) -> Table:

@@ -26,6 +26,7 @@ from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import ENGINES, require_ros
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import say
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 SEEDS = 5
@@ -164,6 +165,6 @@ def run(options: argparse.Namespace) -> int:
         "budgets": comparison_report.budgets(rows),
     }
     written = comparison_report.write(out, trials, results, modular, facts)
-    print(written.text)
-    print(f"vehicle  {vehicle.name}\nresults  {out}\nreport   {written.page}")
+    say(written.text)
+    say(f"vehicle  {vehicle.name}\nresults  {out}\nreport   {written.page}")
     return 0

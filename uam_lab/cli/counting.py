@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from uam_lab.results.terminal import Terminal, say
 
 LINES = 20  # largest number of lines if the output is no terminal
 
@@ -13,14 +14,14 @@ class Counting:
 
     def __init__(self, what: str, total: int):
         self._what, self._total = what, total
-        self._console = Console()
+        self._console = Terminal()
         self._said = 0
         self._bar = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            TextColumn("{task.fields[text]}"),
+            TextColumn("{task.fields[text]}", markup=False),
             console=self._console,
             disable=not self._console.is_terminal,
         )
@@ -39,4 +40,4 @@ class Counting:
         share = LINES * done // self._total
         if not self._console.is_terminal and share > self._said:
             self._said = share
-            print(f"{self._what}: {done} of {self._total}, {text}", flush=True)
+            say(f"{self._what}: {done} of {self._total}, {text}")

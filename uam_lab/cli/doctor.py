@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from rich.console import Console
 from rich.text import Text
 
 from uam_lab.cli.command import Command
 from uam_lab.doctor.finding import Finding, Verdict
 from uam_lab.doctor.run import as_json, examine, worst
+from uam_lab.results.terminal import Terminal, say
 from uam_lab.vehicle.lab import Lab
 from uam_lab.vehicle.lab_file import load_lab
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(url: str, lab: Lab | None, machine_readable: bool) -> int:
     """Print each finding at once, or all as JSON; return the exit status."""
-    console, found = Console(), []
+    console, found = Terminal(), []
     last = ""
     for group, finding in examine(url, lab):
         found.append((group, finding))
@@ -67,7 +67,7 @@ def _show(url: str, lab: Lab | None, machine_readable: bool) -> int:
         _print(console, finding)
     verdict = worst(finding.verdict for _, finding in found)
     if machine_readable:
-        print(as_json(found))
+        say(as_json(found))
     else:
         counts = {v: sum(f.verdict is v for _, f in found) for v in Verdict}
         text = ", ".join(f"{count} {v.value}" for v, count in counts.items() if count)
@@ -75,7 +75,7 @@ def _show(url: str, lab: Lab | None, machine_readable: bool) -> int:
     return BROKEN if verdict is Verdict.FAIL else FINE
 
 
-def _print(console: Console, finding: Finding) -> None:
+def _print(console: Terminal, finding: Finding) -> None:
     """Print one line with the finding and, if it is not OK, one line with advice."""
     line = Text.assemble(
         (f"  {finding.verdict.value:<5}", STYLES[finding.verdict]),

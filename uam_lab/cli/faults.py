@@ -23,6 +23,7 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import say
 from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.vehicle.lab_settings import settings_of
 from uam_sim_bridge.faults import fault_catalogue, feasibility
@@ -83,7 +84,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """List, or check, fly and write the results; return the exit status."""
     if options.list:
-        print(fault_catalogue.listing())
+        say(fault_catalogue.listing())
         return 0
     from uam_lab.campaign import fault_matrix, fault_report, fault_rows
     from uam_lab.campaign.flying import fly_missing, scenario_text
@@ -130,8 +131,8 @@ def run(options: argparse.Namespace) -> int:
         rows = fly_missing(flown, trials, place, fault_rows.to_row, measure, show)
     results = [fault_rows.from_row(row) for row in rows.values()]
     summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line())
-    print(summary)
-    print(f"report   {page}")
+    say(summary)
+    say(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0
 
 

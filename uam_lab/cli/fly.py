@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 from collections.abc import Iterable
-
-from rich.console import Console
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
@@ -20,6 +17,7 @@ from uam_lab.library.flight import Engine, Flight
 from uam_lab.library.flight_result import FlightFailed, FlightResult
 from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.report.page.console import reporting, summary
+from uam_lab.results.terminal import Terminal, say
 from uam_sim_bridge.faults.schedule import late
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
@@ -216,7 +214,7 @@ def fly(
     engine: None for that of the settings; name: of the command.
     """
     landing = settings.scenario.landing
-    console = Console()
+    console = Terminal()
     with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
         flight = Flight.of(settings, progress, stop, engine)
         with contextlib.suppress(FlightFailed), flight:
@@ -225,7 +223,7 @@ def fly(
 
 
 def tell(
-    console: Console,
+    console: Terminal,
     settings: FlightSettings,
     result: FlightResult,
     name: str,
@@ -252,15 +250,15 @@ def tell(
                 outcome.notes.append(made.problem)
         console.print(summary(metrics, result.folder))
     else:
-        print(f"results: {result.folder}")
+        say(f"results: {result.folder}")
     for line in further:
-        print(line)
+        say(line)
     for note in outcome.notes:
-        print(f"note: {note}")
+        say(f"note: {note}")
     if outcome.failure:
-        print(f"uam {name}: {outcome.failure}", file=sys.stderr)
+        say(f"uam {name}: {outcome.failure}", error=True)
         for line in outcome.details:
-            print(f"  | {line}", file=sys.stderr)
+            say(f"  | {line}", error=True)
     if outcome.interrupted:
         return INTERRUPTED
     if settings.dry_run:

@@ -11,6 +11,7 @@ import numpy as np
 
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, number
+from uam_lab.results.terminal import say
 from uam_sim_bridge.drivers.dynamixel.chain import ArmError
 from uam_sim_bridge.drivers.dynamixel.excitation import ExcitationParameters
 from uam_sim_bridge.drivers.dynamixel.friction_fit import FrictionFit
@@ -86,12 +87,12 @@ def run(options: argparse.Namespace) -> int:
     try:
         driver.start()
         for remark in driver.remarks:
-            print(remark)
+            say(remark)
         angles = np.array(driver.start_angles)
         given = angles[joint] if options.centre is None else math.radians(options.centre)
         centre = centre_of(driver, joint, given, p)
         if not options.yes and not confirmed(options.joint, angles[joint], centre, p):
-            print("not confirmed: nothing moved")
+            say("not confirmed: nothing moved")
             return NOT_DONE
         weight = weight_of(options, angles, joint)
         out = make_folder(options.out, "identify", options.joint)  # before the joint moves
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         loads = np.array([weight(one)[joint] for one in record.position[:, joint]])
         fit = fit_friction(record, joint, loads)
     except (Aborted, FitError) as error:
-        print(f"not identified: {error}")
+        say(f"not identified: {error}")
         return NOT_DONE
     finally:
         driver.stop()
@@ -109,18 +110,18 @@ def run(options: argparse.Namespace) -> int:
     head = "time_s,angle_rad,effort_nm,weight_nm"
     np.savetxt(out / "samples.csv", np.column_stack(columns), "%.6f", ",", header=head, comments="")
     draw(out / "friction.png", options.joint, fit)
-    print(text, end="")
-    print(f"residual {fit.residual:.4f} N m, inertia {fit.inertia:.4f} kg m^2")
+    say(text, end="")
+    say(f"residual {fit.residual:.4f} N m, inertia {fit.inertia:.4f} kg m^2")
     if not fit.scale_known:
-        print("torque_scale is unchanged: the weight is too small to show it; hang a --load")
-    print(f"results  {out}")
+        say("torque_scale is unchanged: the weight is too small to show it; hang a --load")
+    say(f"results  {out}")
     return DONE
 
 
 def confirmed(joint: str, angle: float, centre: float, p: ExcitationParameters) -> bool:
     """Ask whether the joint may move; angle, centre [rad]."""
     total = p.duration + 2.0 * p.approach
-    print(
+    say(
         f"{joint} moves from {math.degrees(angle):.0f} deg to {math.degrees(centre):.0f} deg and "
         f"then {p.amplitude_deg:g} deg to either side, {total:.0f} s in all; at most "
         f"{p.effort_max:g} N m.\nPropellers off, vehicle level and fixed, hands away. "

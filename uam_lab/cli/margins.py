@@ -14,6 +14,7 @@ from uam_lab.cli.command import Command, number
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import say
 
 STABLE, UNSTABLE = 0, 1
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
@@ -102,12 +103,12 @@ def run(options: argparse.Namespace) -> int:
         "made": time.strftime("%Y-%m-%dT%H:%M:%S"),
     }
     report.write(out, cases, facts)
-    print(f"{profile.name} on {described.name}, hover, linear")
-    print(report.table(cases))
-    print(f"Poses may come {1e3 * left:.0f} ms later, then the estimate oscillates.")
+    say(f"{profile.name} on {described.name}, hover, linear")
+    say(report.table(cases))
+    say(f"Poses may come {1e3 * left:.0f} ms later, then the estimate oscillates.")
     computed = report.smallest_delay(cases)[0]
-    print(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
-    print(f"results  {out}")
+    say(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
+    say(f"results  {out}")
     return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE
 
 

@@ -9,8 +9,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from uam_control.settings.visible_text import visible
 from uam_lab.cli.command import Command, chosen_flight, number
 from uam_lab.flight.flight_settings import SettingsError, require_ros
+from uam_lab.results.terminal import say
 
 if TYPE_CHECKING:
     from uam_lab.flight.operator import Operator
@@ -111,15 +113,14 @@ def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:
 
 def _kill(operator: Operator, options: argparse.Namespace) -> int:
     if not options.yes:
-        print(
+        say(
             f"{operator.place}: the motors stop at once; a vehicle in the air falls. "
             "Type kill to confirm: ",
             end="",
         )
-        sys.stdout.flush()
         typed = sys.stdin.readline()
         if not typed.endswith("\n"):  # the end of a file or pipe
-            print()
+            say()
         if typed.strip() != "kill":
             return _said("kill", False, "not confirmed, nothing was sent")
     return _said("kill", *operator.kill())
@@ -151,7 +152,7 @@ def _status(operator: Operator, _: argparse.Namespace) -> int:
     if autopilot.reasons:
         rows["reasons"] = autopilot.reasons
     for name, text in rows.items():
-        print(f"{name:<10} {text}")
+        say(f"{name:<10} {visible(text)}")
     return DONE
 
 
@@ -164,12 +165,12 @@ def _preflight(operator: Operator, _: argparse.Namespace) -> int:
     width = max((len(check.name) for check in checks), default=0)
     for check in checks:
         mark = "ok  " if check.passed else "FAIL"
-        print(f"{mark} {check.name:<{width}}  {check.value:<16} {check.limit}")
+        say(visible(f"{mark} {check.name:<{width}}  {check.value:<16} {check.limit}"))
     failed = [check.name for check in checks if not check.passed]
-    print(f"not ready: {', '.join(failed)}" if failed else "ready to start")
+    say(visible(f"not ready: {', '.join(failed)}" if failed else "ready to start"))
     return REFUSED if failed else DONE
 
 
 def _said(name: str, accepted: bool, text: str) -> int:
-    print(f"{name}: {text}", file=sys.stdout if accepted else sys.stderr)
+    say(f"{name}: {visible(text)}", error=not accepted)
     return DONE if accepted else REFUSED

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
 from uam_lab.processes.interrupts import INTERRUPTED
+from uam_lab.results.terminal import say
 
 NOT_WRITTEN = 1  # exit status
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -45,7 +45,8 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> None:
         """Print the line and exit with status 2."""
-        self.exit(WRONG_USE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        say(f"{self.prog}: {message} (see {self.prog} --help)", error=True)
+        self.exit(WRONG_USE)
 
 
 def parser(command: str = "") -> argparse.ArgumentParser:
@@ -77,15 +78,15 @@ def run(options: argparse.Namespace) -> int:
     try:
         return options.run(options)
     except KeyboardInterrupt:
-        print(f"uam {options.command}: interrupted", file=sys.stderr)
+        say(f"uam {options.command}: interrupted", error=True)
         return INTERRUPTED
     except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
         return 1
     except (*USER_ERRORS, OSError) as error:
         if getattr(error, "errno", None) in FULL:
-            print(f"uam {options.command}: {_full(error)}", file=sys.stderr)
+            say(f"uam {options.command}: {_full(error)}", error=True)
             return NOT_WRITTEN
-        print(f"uam {options.command}: {error}", file=sys.stderr)
+        say(f"uam {options.command}: {error}", error=True)
         return WRONG_USE
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import Any
 
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command, chosen_flight
 from uam_lab.flight.flight_settings import SettingsError, require_ros
+from uam_lab.results.terminal import say
 
 CHANGED, REFUSED = 0, 1
 EXAMPLES = """\
@@ -70,15 +70,15 @@ def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
         except SwitchRefused as refusal:
             whole = not isinstance(refusal, SwitchIncomplete)
             state = "nothing changed" if whole else "but not all nodes have their old values"
-            print(f"uam profile: refused, {state}", file=sys.stderr)
+            say(f"uam profile: refused, {state}", error=True)
             for line in str(refusal).splitlines():
-                print(f"  {line}", file=sys.stderr)
+                say(f"  {line}", error=True)
             return REFUSED
     for node, values in changed.items():
         for name, (old, new) in values.items():
-            print(f"{node}: {name}: {_text(old)} -> {_text(new)}")
+            say(f"{node}: {name}: {_text(old)} -> {_text(new)}")
     count = sum(map(len, changed.values()))
-    print(
+    say(
         f"{profile.name} is active: {count} values changed"
         if count
         else f"{profile.name} is already active"

@@ -6,8 +6,6 @@ import argparse
 import os
 from dataclasses import replace
 
-from rich.console import Console
-
 from uam_lab.cli.command import Command, chosen_effects, number
 from uam_lab.cli.fly import tell
 from uam_lab.flight.conclude import command_line
@@ -15,6 +13,7 @@ from uam_lab.flight.flight_settings import require_ros
 from uam_lab.flight.progress import Progress
 from uam_lab.library.flight_result import FlightResult
 from uam_lab.processes.interrupts import Interrupts
+from uam_lab.results.terminal import Terminal
 from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.vehicle.lab_settings import settings_of
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
@@ -123,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
         px4=px4,
         px4_params=tuple(options.px4_params),
     )
-    console = Console()
+    console = Terminal()
     landing = settings.scenario.landing
     with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
         folder, outcome, metrics = fly(lab, settings, rehearsal, progress, stop)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
-
 from uam_lab.cli.command import Command
 from uam_lab.flight.flight_settings import require_ros
 from uam_lab.results.result_folder import ResultFolderError, make_folder, read_json
+from uam_lab.results.terminal import Terminal, say
 
 WRITTEN = 0
 # of metrics.json, without which there is no summary
@@ -64,14 +63,14 @@ def one(options: argparse.Namespace) -> int:
             raise ResultFolderError(f"{directory / 'metrics.json'}: {missing[0]} is missing")
     else:
         raise ResultFolderError(f"{directory} has no {LOG} for a report")
-    console = Console()
+    console = Terminal()
     pictures = not options.no_pictures
     with reporting(console) as show:
         report = build_report(out, show, video=not options.no_video, pictures=pictures)
     console.print(summary(metrics, out))
     for note in [*_notes(out), report.problem]:
         if note:
-            print(f"note: {note}")
+            say(f"note: {note}")
     return WRITTEN
 
 
@@ -88,9 +87,9 @@ def several(options: argparse.Namespace) -> int:
         for name, directory in zip(names, options.directories, strict=True)
     ]
     out = make_folder(options.out, "report")
-    with reporting(Console()) as show:
+    with reporting(Terminal()) as show:
         page = build_overlay(flights, out, show)
-    print(f"report: {page}")
+    say(f"report: {page}")
     return WRITTEN
 
 

@@ -16,6 +16,7 @@ from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import SettingsError, require_ros
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import make_folder, read_json, versions, write_json
+from uam_lab.results.terminal import say
 from uam_lab.study.description import Study, load_study
 from uam_lab.study.flights import StudyFlight, StudyResult
 from uam_lab.workers.place import Workplace
@@ -37,9 +38,9 @@ def run(options: argparse.Namespace) -> int:
         require_ros()
     out = make_folder(options.out, "study", study.name)
     if options.design:
-        found = design.strengths(study, lambda text: print(text, flush=True))
+        found = design.strengths(study, lambda text: say(text))
         write_json(out / "strengths.json", found)
-        print(f"strengths  {json.dumps(found)}\nresults    {out}")
+        say(f"strengths  {json.dumps(found)}\nresults    {out}")
         return 0
     if options.tune:
         return _tune(study, options.tune, out)
@@ -75,7 +76,7 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
             study.document["strengths"],
             evaluations,
             out / "scenarios",
-            lambda text: print(text, flush=True),
+            lambda text: say(text),
         )
         done[law] = {"costs": found.costs, "best": found.best}
         write_json(file, done)
@@ -83,9 +84,9 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
         costs = {law: one["costs"] for law, one in done.items()}
         figures.save(figures.tuning(costs), out / "tuning.png")
     for law, one in done.items():
-        print(f"{law}: cost {one['costs'][0]:.4g} to {min(one['costs']):.4g}: {one['best']}")
-        print(f"  {convergence(list(accumulate(one['costs'], min)), PATIENCE)}")
-    print(f"results  {out}")
+        say(f"{law}: cost {one['costs'][0]:.4g} to {min(one['costs']):.4g}: {one['best']}")
+        say(f"  {convergence(list(accumulate(one['costs'], min)), PATIENCE)}")
+    say(f"results  {out}")
     return 0
 
 
@@ -134,6 +135,6 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
         out / "study.json",
         {"command": command_line(), "versions": versions(), "study": study.document},
     )
-    print(text)
-    print(f"results  {out}")
+    say(text)
+    say(f"results  {out}")
     return 0

@@ -21,6 +21,7 @@ from uam_lab.flight.conclude import command_line
 from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.processes.interrupts import INTERRUPTED
 from uam_lab.results.result_folder import make_folder
+from uam_lab.results.terminal import say
 from uam_lab.tuning.convergence import SMALL
 from uam_lab.tuning.convergence import in_words as convergence
 from uam_lab.tuning.space import TuningError, load_space
@@ -95,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
     out = make_folder(options.out, "tune", space.name)
     place = place_of(options)
     if place.scheduler and not options.storage:
-        print("uam tune: with --scheduler the workers need to reach --storage", file=sys.stderr)
+        say("uam tune: with --scheduler the workers need to reach --storage", error=True)
     storage = options.storage or str((out / "study.journal").resolve())
     task = Task(
         space,
@@ -119,7 +120,7 @@ def run(options: argparse.Namespace) -> int:
             search(task, place, show)
     except KeyboardInterrupt:
         status = INTERRUPTED
-        print(
+        say(
             "uam tune: interrupted; the same command continues the search"
             if options.out
             else f"uam tune: interrupted; --out {out} continues the search",
@@ -133,9 +134,9 @@ def run(options: argparse.Namespace) -> int:
     search_results.plot(out / "search.png", space, study)
     best, told = search_results.best_of(space, study), search_results.in_words
     begun = told(evaluated_start(space, study))
-    print(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
+    say(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
     values = curve(study)
-    print(f"search    {convergence(values, options.patience or max(1, len(values) // 2))}")
-    print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
-    print(f"plot      {out / 'search.png'}")
+    say(f"search    {convergence(values, options.patience or max(1, len(values) // 2))}")
+    say(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
+    say(f"plot      {out / 'search.png'}")
     return status

@@ -16,6 +16,7 @@ from uam_lab.cli.fly import fly
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.results.result_folder import in_a_name, new_folder
+from uam_lab.results.terminal import say
 from uam_lab.vehicle.lab_file import load_lab, template
 from uam_lab.vehicle.lab_settings import settings_of
 
@@ -59,13 +60,13 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     if options.example:
-        print(template(), end="")
+        say(template(), end="")
         return DONE
     if options.config is None:
         raise SettingsError("--config LAB is missing; uam vehicle --example prints a template")
     lab = load_lab(options.config)
     if options.systemd:
-        print(unit(lab.file, Path.cwd()), end="")
+        say(unit(lab.file, Path.cwd()), end="")
         return DONE
     from uam_lab.vehicle.vehicle_engine import VehicleEngine  # needs ROS
 

@@ -7,13 +7,14 @@ import re
 import time
 from collections.abc import Iterable, Sequence
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
 from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus, Observer
+from uam_lab.results.terminal import Terminal
 
 PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a phase
 
@@ -21,9 +22,9 @@ PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a ph
 class Progress(Observer):
     """Shows messages and the newest status. A context manager."""
 
-    def __init__(self, console: Console | None = None, duration: float | None = None):
+    def __init__(self, console: Terminal | None = None, duration: float | None = None):
         """duration: planned duration of the mission [s], if known."""
-        self.console = console or Console()
+        self.console = console or Terminal()
         self._duration = duration
         self._live: Live | None = None
         self._shown: tuple[str, float, str] = ("", -math.inf, "")
@@ -40,7 +41,7 @@ class Progress(Observer):
 
     def message(self, text: str) -> None:
         """Print one permanent line."""
-        self.console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self.console.print(text, soft_wrap=True)
 
     def bring_up(self, devices: Sequence[DeviceState]) -> None:
         """Show the devices: as a table until all are there, without a terminal each change."""
@@ -110,7 +111,7 @@ class Progress(Observer):
         bar = ""
         if self._duration is not None:
             bar = ProgressBar(self._duration, max(status.time, 0.0), width=40)
-        table.add_row("phase", f"[bold]{status.phase}[/bold]", bar)
+        table.add_row("phase", Text(status.phase, "bold"), bar)
         table.add_row("mission time", self._when(status))
         table.add_row(
             "errors",
@@ -120,7 +121,7 @@ class Progress(Observer):
         )
         table.add_row("tilt", f"{math.degrees(status.tilt):.2f}°")
         if status.released_to:
-            table.add_row("control", f"[bold yellow]{status.released_to}[/bold yellow]")
+            table.add_row("control", Text(status.released_to, "bold yellow"))
         table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
         return table
 

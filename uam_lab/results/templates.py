@@ -10,6 +10,8 @@ from typing import Any
 
 import jinja2
 
+from uam_control.settings.visible_text import visible
+
 MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 
 
@@ -36,6 +38,10 @@ def embedded(file: Path) -> str:
 
 
 def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table, without a newline at its end."""
-    lines = [f"| {' | '.join(cells)} |" for cells in (head, *rows)]
+    """Return a Markdown table, without a newline at its end; a pipe in a cell is escaped."""
+    lines = [f"| {' | '.join(map(_cell, cells))} |" for cells in (head, *rows)]
     return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
+
+
+def _cell(text: str) -> str:
+    return visible(text).replace("|", "\\|")

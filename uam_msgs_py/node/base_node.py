@@ -19,6 +19,7 @@ from rclpy.subscription import Subscription
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
+from uam_control.settings.visible_text import visible
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
@@ -397,5 +398,5 @@ def _failure_of(nodes: Sequence[UamNode]) -> str:
 def refuse(name: str, error: Exception) -> int:
     """Print in one line why the node does not start; return its exit status, REFUSED."""
     text = re.sub(r", at \S+:\d+", "", str(error))  # rcl appends positions in its own sources
-    print(f"{name}: {' '.join(text.split())}", file=sys.stderr, flush=True)
+    print(visible(f"{name}: {' '.join(text.split())}"), file=sys.stderr, flush=True)
     return REFUSED

@@ -112,7 +112,7 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
         top = {"xycoords": "axes fraction", "fontweight": "bold"}
         style.note(axes[0, column], subsystem, (0.0, 1.0), (0, 14), **top)
     for row, group in zip(axes, shown, strict=True):
-        row[0].set_ylabel(group.label)
+        row[0].set_ylabel(group.label, parse_math=True)
         if len(group.names) > 1:
             _gain_legend(row[2], group, above=1.06 if group == shown[0] else 0.97)
         for axis in () if group.signed else row:
@@ -129,7 +129,7 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
 def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
     """Add the legend of a row of gains; in the first row it is above the phase names."""
     lines = zip(style.GAINS, group.names, strict=False)
-    axis.legend(
+    legend = axis.legend(
         handles=[style.key(f"${group.symbol}_{name[-1]}$", c, 1.1) for c, name in lines],
         loc="lower right",
         bbox_to_anchor=(1.02, above),
@@ -138,6 +138,7 @@ def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
         columnspacing=0.8,
         fontsize=8.0,
     )
+    style.formulas(legend)
 
 
 def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:

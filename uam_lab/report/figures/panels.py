@@ -128,7 +128,7 @@ def lines(axis: Axes, flights: Sequence[DrawnFlight], panel: Panel) -> None:
             linewidth=width,
             zorder=3 + len(flights) - number,
         )
-    axis.set_ylabel(panel.label)
+    axis.set_ylabel(panel.label, parse_math=True)
     axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, symmetric=False))
     axis.margins(y=0.12)
 

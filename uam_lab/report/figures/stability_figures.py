@@ -36,7 +36,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     figure, axes = panels.grid("Lyapunov function of the Appendix", 4, 1, 1.7, right=0.985)
     total, *each = axes[:, 0]
     _bounded(total, found.time, found.total, found.comparison)
-    total.set_ylabel("$V$")
+    total.set_ylabel("$V$", parse_math=True)
     for axis, name in zip(each, SUBSYSTEMS, strict=True):
         subsystem = found.subsystems[name]
         for values, colour in zip(_terms(subsystem), style.GAINS[1:], strict=True):
@@ -44,7 +44,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
                 *panels.thin(found.time, np.maximum(values, LOWEST)), color=colour, linewidth=0.9
             )
         _bounded(axis, found.time, subsystem.parts.total, subsystem.comparison)
-        axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$")
+        axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$", parse_math=True)
     handles = [
         style.key("$V$", style.INK, 1.5),
         style.key("tracking", style.GAINS[1]),
@@ -54,6 +54,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
         style.key("ultimate bound", style.DROP, 1.0, BOUND),
     ]
     panels.finish(figure, axes, flights, handles)
+    style.formulas(figure.legends[0])
     return figure
 
 
@@ -84,7 +85,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
                 continue  # the servos' torque is not recorded
             mean = moving_mean(found.time, values[:, column])
             axis.plot(*panels.thin(found.time, mean), color=colour, linewidth=width)
-        axis.set_ylabel(label)
+        axis.set_ylabel(label, parse_math=True)
         axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3))
         axis.margins(y=0.12)
     handles = [

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from uam_lab.results.atomic import replacing
 
@@ -59,6 +61,8 @@ SETTINGS = {
     "legend.fontsize": 8.5,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
+    # names of phases, files, faults may contain "$"; formulas: see `formulas`
+    "text.parse_math": False,
     # constant, so that the same flight gives the same bytes
     "svg.hashsalt": "uam",
 }
@@ -91,6 +95,12 @@ def note(
     """Write a text at (x of the data, height of the panel), shifted by points."""
     how = {"xycoords": ("data", "axes fraction"), **how}
     axis.annotate(text, at, xytext=shift, textcoords="offset points", **how)
+
+
+def formulas(artist: Artist) -> None:
+    """Let the texts of `artist`, which are the program's own, be formulas between dollar signs."""
+    for text in artist.findobj(Text):
+        text.set_parse_math(True)
 
 
 def title(figure: Figure, text: str) -> None:

@@ -7,16 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from uam_control.laws import catalogue
 from uam_lab.report.facts import flight_summary
+from uam_lab.results.terminal import Terminal
 
 
 @contextmanager
-def reporting(console: Console) -> Iterator[Callable[[str], None]]:
+def reporting(console: Terminal) -> Iterator[Callable[[str], None]]:
     """Progress for `build_report`: a live line on a terminal, otherwise one line per kind of step.
 
     with reporting(console) as progress:
@@ -24,7 +25,7 @@ def reporting(console: Console) -> Iterator[Callable[[str], None]]:
     """
     if console.is_terminal:
         with console.status("report") as status:
-            yield lambda text: status.update(f"report: {text}")
+            yield lambda text: status.update(Text(f"report: {text}"))
         return
     printed: set[str] = set()
 
@@ -32,7 +33,7 @@ def reporting(console: Console) -> Iterator[Callable[[str], None]]:
         kind = text.split()[0]
         if kind not in printed:
             printed.add(kind)
-            console.print(f"report: {text}", highlight=False, markup=False)
+            console.print(f"report: {text}")
 
     yield show
 
