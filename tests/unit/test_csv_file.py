@@ -111,6 +111,49 @@ def test_rounded_numbers_give_no_jumps_of_the_jerk(tmp_path, digits):
     assert np.abs(rows[3, :, :2]).max() < 8.0 * 1.2 and np.abs(rows[4, :, :2]).max() < 16.0 * 2
 
 
+def race(times, speed, climbs=0.0):
+    """Positions, velocities, accelerations (m, 9) of a circle of 3 m, begun and ended at speed.
+
+    climbs [m/s]: vertical speed at the begin.
+    """
+    w, columns = speed / 3.0, []
+    for k in range(3):
+        turned = w * times + k * np.pi / 2
+        up = climbs * w ** (k - 1) * np.sin(turned) + (1.6 if k == 0 else 0.0)
+        columns += [3.0 * w**k * np.cos(turned), 3.0 * w**k * np.sin(turned), up]
+    return np.column_stack(columns)
+
+
+@pytest.mark.parametrize("columns", [4, 7, 10])
+@pytest.mark.parametrize(("rate", "digits"), [(50, 3), (100, 3), (200, 3), (100, 6)])
+def test_a_ramp_needs_no_more_than_a_race_that_begins_at_speed(tmp_path, columns, rate, digits):
+    """8.3 m/s^2, 13.9 m/s^3 and 23 m/s^4 by hand; the rounding of the rows is not in the ends."""
+    times = np.arange(0.0, 4.0 + 0.5 / rate, 1.0 / rate)
+    table = np.column_stack([times, race(times, 5.0)])[:, :columns]
+    header = "t,px,py,pz,vx,vy,vz,ax,ay,az".split(",")[:columns]
+    scenario = load_scenario(csv_file(tmp_path, ",".join(header), text(table, digits)))
+    legs = scenario.route.legs
+    assert [leg.phase for leg in legs] == ["run-up", "trajectory", "run-out"]
+    whole, at = scenario.route.path, np.cumsum([leg.path.length for leg in legs])[:2]
+    rows = whole.rows(np.linspace(0.0, whole.length, 2000))[:, :, :3]
+    largest = np.linalg.norm(rows, axis=2).max(axis=1)
+    assert (largest[2:] < (8.33 * 1.06, 30.0, 120.0)).all()
+    assert (np.abs(rows[0]) < (4.1, 4.1, 1.7)).all()  # within 1 m of the race
+    for joint in at:
+        before, after = (whole.rows(np.array([joint + d]))[:, 0, :3] for d in (-1e-9, 1e-9))
+        np.testing.assert_allclose(before, after, atol=1e-3)
+
+
+@pytest.mark.parametrize("climbs", [0.5, 1.0])
+def test_a_run_up_to_a_climb_stays_above_the_ground(tmp_path, climbs):
+    times = np.arange(0.0, 1.8, 0.01)
+    table = np.column_stack([times, race(times, 5.0, climbs)])
+    names = "t,px,py,pz,vx,vy,vz,ax,ay,az"
+    first = load_scenario(csv_file(tmp_path, names, text(table))).route.legs[0]
+    assert first.phase == "run-up"
+    assert first.path.rows(np.linspace(0.0, first.path.length, 500))[0, :, 2].min() > 0.5
+
+
 def test_arm_angles_are_flown(tmp_path):
     times = np.arange(0.0, 4.01, 0.1)
     angles = np.column_stack([0.5 * np.sin(times), 1.2 - 0.2 * times])

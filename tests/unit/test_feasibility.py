@@ -1,6 +1,7 @@
 """Feasibility of references: hand-worked demands, refusals in words, retiming."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -206,6 +207,29 @@ def test_retimed_is_feasible_and_not_slower_than_necessary(
         assert check.excesses(scenario.slowed(factor / 1.02))
     else:
         assert retimed is scenario
+
+
+def csv_of(folder, row):
+    """Rows of a way at speed: row(t) → x, y, z, for 1 s."""
+    file = folder / "fast.csv"
+    rows = [",".join(f"{v:.6f}" for v in (t, *row(t))) for t in np.arange(0.0, 1.001, 0.01)]
+    file.write_text("\n".join(["t,px,py,pz", *rows]) + "\n")
+    return load_scenario(str(file))
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        # 6 m/s: from rest with 3 m/s^2 it needs more room than the fence leaves
+        (lambda t: (-3 + 6 * t, 0, 1.5), "run-up: x -16.* m is below -5 m at .*; run-out: x 16"),
+        (
+            lambda t: (t, 0, 0.5 + 2.5 * t),
+            ".*run-up: height while it moves across -.* m is below 0.05",
+        ),
+    ],
+)
+def test_a_refusal_names_the_ramp_that_is_its_reason(tmp_path, row, words):
+    assert re.match(words, in_words(checked().excesses(csv_of(tmp_path, row))))
 
 
 def test_a_place_outside_the_geofence_is_not_retimed(tmp_path):

@@ -18,6 +18,7 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.trajectory import Trajectory, reference_rows
+from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
 from uam_control.mission.scenarios.scenario import Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import VehicleDescription, VehicleError
@@ -46,7 +47,7 @@ class InfeasibleReference(ScenarioError):
 class Excess(NamedTuple):
     """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins.
 
-    origin: of a limit that is in no parameter, in words.
+    origin: of a limit that is in no parameter, in words; ramp: the run-up or run-out it is in.
     """
 
     quantity: str
@@ -56,16 +57,22 @@ class Excess(NamedTuple):
     time: float
     first: float
     origin: str = ""
+    ramp: str = ""
 
     @property
     def text(self) -> str:
         """The excess in words."""
         beyond = "exceeds" if self.value > self.limit else "is below"
         limit = f"{self.limit:.3g} {self.unit}" + (f", {self.origin}," if self.origin else "")
+        ramp = f"{self.ramp}: " if self.ramp else ""
         return (
-            f"{self.quantity} {self.value:.3g} {self.unit} {beyond} {limit} "
+            f"{ramp}{self.quantity} {self.value:.3g} {self.unit} {beyond} {limit} "
             f"at {self.time:.1f} s (from {self.first:.1f} s on)"
         )
+
+
+def _beyond(excess: Excess) -> float:
+    return abs(excess.value - excess.limit)
 
 
 class Demand(NamedTuple):
@@ -87,7 +94,7 @@ class Demand(NamedTuple):
     joint_torques: np.ndarray
     magnet_force: np.ndarray
 
-    def within(self, part: slice) -> Demand:
+    def within(self, part: slice | np.ndarray) -> Demand:
         """Return that of a part of the times."""
         return Demand(*(values[part] for values in self))
 
@@ -122,15 +129,32 @@ class Feasibility:
         """
         flight = _Planned(scenario)
         found: dict[tuple[str, float], Excess] = {}
+        legs: dict[str, dict[tuple[str, float], Excess]] = {RUN_UP: {}, TRAJECTORY: {}, RUN_OUT: {}}
         for begin in range(0, len(flight.times), PART):
             part = slice(max(begin - BESIDE, 0), begin + PART + BESIDE)
             demand = self._planned(flight, part)
             demand = demand.within(slice(begin - part.start, begin - part.start + PART))
-            for one in self.exceeded(demand, flight.ground):
-                known = found.get((one.quantity, one.limit), one)
-                worst = max(known, one, key=lambda excess: abs(excess.value - excess.limit))
-                found[one.quantity, one.limit] = worst._replace(first=known.first)
+            if not self._collect(demand, flight.ground, found):
+                continue
+            phases = np.array([flight.scenario.phase(time) for time in demand.times])
+            for leg, excesses in legs.items():
+                if (phases == leg).sum() > 1:
+                    self._collect(demand.within(phases == leg), flight.ground, excesses)
+        for leg in (RUN_UP, RUN_OUT):  # where the ramp is the reason, it is named
+            for key in legs[leg].keys() - legs[TRAJECTORY].keys():
+                named = legs[leg][key]._replace(ramp=leg)
+                found[key] = max(named, found[key], key=_beyond) if found[key].ramp else named
         return sorted(found.values(), key=lambda excess: excess.first)
+
+    def _collect(self, demand: Demand, ground: float, found: dict) -> bool:
+        """Add what a demand exceeds to `found`, the worst of each limit; return whether it does."""
+        exceeded = self.exceeded(demand, ground)
+        for one in exceeded:
+            key = one.quantity, one.limit
+            known = found.get(key, one)
+            worst = max(known, one, key=_beyond)
+            found[key] = worst._replace(first=known.first)
+        return bool(exceeded)
 
     def from_place(self, scenario: Scenario, start: np.ndarray) -> list[Excess]:
         """Return what the first moves across exceed on a flight from chi start (6 + n,).
@@ -197,16 +221,15 @@ class Feasibility:
         return sorted(found, key=lambda excess: excess.first)
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return heights (m,) [m] of a vehicle that moves across before it was airborne, and sink
-        rates (m,) [m/s] of one that comes straight down; infinite at all other times.
+        """Return heights (m,) [m] of a vehicle that moves across, and sink rates (m,) [m/s] of one
+        that comes straight down; infinite at all other times.
         """
         height = demand.position[:, Z] - ground
         velocity = np.gradient(demand.position, demand.times, axis=0)
         across = np.hypot(velocity[:, X], velocity[:, Y]) > CRAWL
         airborne = height > self.limits.airborne_height
-        drags = across & ~np.maximum.accumulate(airborne)
         lands = ~across & ~airborne
-        return np.where(drags, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
+        return np.where(across, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
 
     @property
     def thrust_limit(self) -> float:

@@ -27,6 +27,8 @@ LONG_GAP = 2.0  # [s] between two samples: the normal equations lose the curve i
 ATTEMPTS = 5  # each with knots at half the distance
 # A unit of misfit in rate, acceleration and snap weighs as much as these in value [s, s^2, s^4].
 RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 5e-9
+END, END_PIECES = 3e-7, 2  # [s^6] of the sixth derivative in so many intervals at either end
+DENSE = 1.5  # rows per interval, from which on
 LEAST_ACCELERATION = 1e-6  # [s^2] of acceleration itself: decides where under four samples do not
 
 
@@ -94,6 +96,12 @@ def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSplin
     for order, weight in ((4, SNAP), (2, LEAST_ACCELERATION)):  # few samples have one solution, too
         rows.append(weight * _basis(between, knots, order))
         right.append(np.zeros((len(between), size)))
+    if len(times) > DENSE * len(inner):
+        # a curve ends with nothing beyond it: the noise of the last rows would be its jerk and snap
+        ends = np.unique([*between[: 4 * END_PIECES], *between[-4 * END_PIECES :]])
+        step = min(COARSEST, inner[1] - inner[0])
+        rows.append(END * (step / COARSEST) ** 6 * _basis(ends, knots, 6))
+        right.append(np.zeros((len(ends), size)))
     matrix, target = vstack(rows).tocsc(), np.concatenate(right)
     if np.diff(times).max() > LONG_GAP:
         return BSpline(knots, _solved_by_qr(matrix.tocsr(), target), DEGREE)

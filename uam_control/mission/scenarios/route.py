@@ -29,6 +29,7 @@ from uam_control.mission.motion.polynomials import (
     reversed_in_time,
 )
 from uam_control.mission.scenarios.scenario_options import RETURN, ScenarioOptions
+from uam_control.vehicle import GRAVITY
 
 TAKEOFF, LANDING = 3.0, 5.0  # [s] shortest
 SHORTEST = 1.0  # [s] of another part
@@ -41,6 +42,9 @@ AT_REST = (0.0, 0.005, 0.02, 0.2, 2.0)  # rates, accelerations, ... that count a
 RAMP_LENGTHS = 5, 150  # [s / PER_SECOND]
 MARGIN = 1.25  # acceleration, jerk and snap in a run-up / at the trajectory's begin
 RAMP_LIMITS = (1.0, 4.0, 16.0)  # acceleration, jerk [1/s] and snap [1/s^2] / transit_acceleration
+HARDER = (3.0, 7.0, 7.0)  # times these in a ramp that would leave the room
+ROUNDING, SHARPER = 1.001, 1.5  # of acceleration, and of jerk and snap / the trajectory's own
+ROOM, LOWEST = 1.0, 0.6  # [m] of a ramp around the trajectory; height where the trajectory is above
 TURN_PER_WAY = 3.0  # [rad/m] the same of yaw and joints / of the position
 RUN_UP, TRAJECTORY, RUN_OUT = "run-up", "trajectory", "run-out"
 
@@ -134,12 +138,12 @@ def _move(
 def with_ramps(path: Polynomials, options: ScenarioOptions) -> tuple[Leg, ...]:
     """Return `path` as the trajectory, with a run-up and a run-out where it is not at rest."""
     begin, end = path.ends()
-    legs = [Leg(TRAJECTORY, path)]
+    legs, beside = [Leg(TRAJECTORY, path)], _Needs.of(path, options)
     if not _at_rest(begin):
-        legs.insert(0, Leg(RUN_UP, _ramp(begin, options)))
+        legs.insert(0, Leg(RUN_UP, beside.ramp(begin)))
     if not _at_rest(end):
         end[[CHI_DOT, JERK]] *= -1.0  # flown backwards in time
-        legs.append(Leg(RUN_OUT, reversed_in_time(_ramp(end, options))))
+        legs.append(Leg(RUN_OUT, reversed_in_time(beside.ramp(end))))
     return tuple(legs)
 
 
@@ -147,25 +151,74 @@ def _at_rest(rows: np.ndarray) -> bool:
     return all(np.abs(row).max() <= limit for row, limit in zip(rows[1:], AT_REST[1:], strict=True))
 
 
-def _ramp(goal: np.ndarray, options: ScenarioOptions) -> Polynomials:
-    """Return the shortest run-up to goal (5, 6 + n) within the limits; without one, the gentlest.
+class _Needs(NamedTuple):
+    """What a trajectory needs, so that a ramp to it needs no more.
 
-    A limit is the value at the goal, with a margin, where that is more.
+    limits (2, 3): acceleration, jerk and snap of the position, and of yaw and joints; force, tilt:
+    the largest [m/s^2 per mass, rad]; low, high (3,): the room [m]; least (2, 3): gentle limits.
     """
-    least = np.array([options.transit_acceleration * factor for factor in RAMP_LIMITS])
-    limits = _sizes(goal[None]).max(axis=0)[:, CHI_DDOT:] * MARGIN
-    limits = np.maximum(limits, np.stack([least, least * TURN_PER_WAY]))
-    best, smallest = None, math.inf
-    for tenths in range(*RAMP_LENGTHS):
-        length = tenths / PER_SECOND
-        ramp = ramp_up(goal, length)
-        rows = ramp.rows(np.linspace(1e-6, length - 1e-6, 60)).swapaxes(0, 1)
-        excess = float((_sizes(rows)[:, :, CHI_DDOT:] / limits).max())
-        if excess < smallest:
-            best, smallest = ramp, excess
-        if excess <= 1.0:
-            break
-    return best
+
+    limits: np.ndarray
+    force: float
+    tilt: float
+    low: np.ndarray
+    high: np.ndarray
+    least: np.ndarray
+
+    @classmethod
+    def of(cls, path: Polynomials, options: ScenarioOptions) -> _Needs:
+        """Return the needs of a trajectory, at least those of `options`."""
+        rows = _inside(path, max(200, 4 * len(path.knots)))
+        least = np.array([options.transit_acceleration * factor for factor in RAMP_LIMITS])
+        least = np.stack([least, least * TURN_PER_WAY])
+        own = _sizes(rows).max(axis=0)[:, CHI_DDOT:] * (ROUNDING, SHARPER, SHARPER)
+        limits, (force, tilt) = np.maximum(own, least * HARDER), _force_and_tilt(rows)
+        hardest = HARDER[0] * options.transit_acceleration
+        low, high = rows[:, 0, POSITION].min(axis=0), rows[:, 0, POSITION].max(axis=0)
+        ground = min(low[Z], LOWEST)
+        low, high = low - ROOM, high + ROOM
+        low[Z] = max(low[Z], ground)
+        force = max(ROUNDING * float(force.max()), GRAVITY + hardest)
+        tilt = max(ROUNDING * float(tilt.max()), math.atan(hardest / GRAVITY))
+        return cls(limits, force, tilt, low, high, least)
+
+    def ramp(self, goal: np.ndarray) -> Polynomials:
+        """Return the run-up to goal (5, 6 + n) that needs no more than the trajectory.
+
+        The shortest gentle one within the room; else the gentlest there; else the one that leaves
+        the room least. If each needs more than the trajectory: the one with the least need.
+        """
+        gentle = np.maximum(_sizes(goal[None]).max(axis=0)[:, CHI_DDOT:] * MARGIN, self.least)
+        best, least = None, (math.inf,) * 3
+        for tenths in range(*RAMP_LENGTHS):
+            ramp = ramp_up(goal, tenths / PER_SECOND)
+            rows = _inside(ramp, 60)
+            sizes, (force, tilt) = _sizes(rows)[:, :, CHI_DDOT:], _force_and_tilt(rows)
+            needs = (sizes / self.limits).max(), force.max() / self.force, tilt.max() / self.tilt
+            places = rows[:, 0, POSITION]
+            outside = max(0.0, float(np.maximum(self.low - places, places - self.high).max()))
+            rank = (max(1.0, *needs), outside, max(1.0, float((sizes / gentle).max())))
+            if rank < least:
+                best, least = ramp, rank
+            if rank == (1.0, 0.0, 1.0):
+                break
+        return best
+
+
+def _inside(path: Polynomials, count: int) -> np.ndarray:
+    """Return rows (count, 5, 6 + n) from just after the begin of a path to just before its end."""
+    first, last = path.knots[0] + 1e-6, path.knots[-1] - 1e-6
+    return path.rows(np.linspace(first, last, count)).swapaxes(0, 1)
+
+
+def _force_and_tilt(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force per mass (m,) [m/s^2] and the tilt (m,) [rad] that rows (m, 5, 6 + n) need.
+
+    Without drag.
+    """
+    push = rows[:, CHI_DDOT, POSITION] + (0.0, 0.0, GRAVITY)
+    force = np.linalg.norm(push, axis=1)
+    return force, np.arccos(np.clip(push[:, Z] / np.maximum(force, 1e-9), -1.0, 1.0))
 
 
 def _sizes(rows: np.ndarray) -> np.ndarray:
