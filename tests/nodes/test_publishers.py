@@ -18,7 +18,8 @@ from uam_msgs_py.messages.status import ERROR
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node import polling, sole_publisher
 from uam_msgs_py.node.connections import READERS, Connections
-from uam_msgs_py.node.rightful import Rightful
+from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.rightful import RightfulNodes
 
 PERIOD = 4_000_000
 NAMES = coordinates(2)
@@ -91,11 +92,12 @@ class Guarded:
 
     def __init__(self, probe, topic):
         self.inlet = polling.listen(probe.node, topic, topic.reading, raw=True)
-        rightful = Rightful("/mission", only=True)
-        self.guard = sole_publisher.SolePublisher(probe.node, self.inlet, rightful, lambda: True)
+        self.door = Door(probe.node)
+        self.door.guard(self.inlet, topic.name, RightfulNodes(), lambda: True)
+        self.guard = self.door.guards[self.inlet]
 
     def read(self):
-        return len(list(polling.messages(self.inlet, self.guard)))
+        return len(list(self.door.messages(self.inlet)))
 
 
 class Diagnostics:

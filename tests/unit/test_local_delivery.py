@@ -19,6 +19,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node import local_delivery, wiring
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.rightful import RightfulNodes
 
@@ -63,7 +64,7 @@ class FakeNode:
     def __init__(self, delivery, name, publishers="", triggers=()):
         self.delivery, self.name, self.triggers = delivery, name, triggers
         self.rightful = RightfulNodes("/", publishers)
-        self.sole_publishers = {}
+        self.door = Door(self)
 
     def get_name(self):
         return self.name
@@ -114,7 +115,7 @@ def test_readers_get_the_object_at_once_others_when_it_is_sent():
     assert out.publisher.sent == [message]
     delivery.send()
     assert len(out.publisher.sent) == 1
-    assert mission.sole_publishers == {first: "guard of mission"}
+    assert mission.door.guards == {first: "guard of mission"}
     assert not delivery.inlets and delivery.known == {first, second}
 
 

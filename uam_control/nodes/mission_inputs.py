@@ -52,15 +52,12 @@ class MissionInputs:
         name = topic.name
 
         def guarded(message: Any) -> None:
-            try:
-                read(message)
-            except BadMessage as error:
-                self._node.refuse(name, error)
+            self._node.door.accepts(inlet, read, message)
 
         def handle(message: Any) -> None:
             self._supervisor.keep(name, guarded, (message,), answers(message))
 
-        self._node.listen(topic, handle, required=False)
+        inlet = self._node.listen(topic, handle, required=False)
 
     def _on_mocap(self, data: bytes) -> None:
         stamp, *pose = read_pose(data)  # refuses a pose that the estimator cannot use

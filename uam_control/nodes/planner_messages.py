@@ -8,13 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from rclpy.serialization import deserialize_message
 
 from uam_control.coordinates import ALPHA, ARM, CHI, POSITION, YAW
 from uam_control.mission.plans import BASE, MOST_POINTS, GoalPose, Points
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages.layouts import BadMessage, Cursor, is_little_endian
-from uam_msgs_py.messages.serialized import all_finite
+from uam_msgs_py.messages.serialized import all_finite, deserialized
 from uam_msgs_py.messages.topics import WORLD
 
 LEVEL = 0.05  # [rad] largest tilt of a goal: the position law itself sets the attitude
@@ -30,7 +29,7 @@ def read_goal(data: bytes) -> GoalPose:
     A height of exactly 0 keeps the height: RViz's 2D goal tool sends it. An orientation of zeros or
     NaN keeps the heading.
     """
-    message = deserialize_message(data, PoseStamped)
+    message = deserialized(data, PoseStamped)
     _check_frame(message.header.frame_id)
     p, q = message.pose.position, message.pose.orientation
     height = math.nan if p.z == 0.0 else p.z

@@ -70,6 +70,8 @@ def _facts(health: Health, limits: Mapping[str, list[float]]) -> Iterator[Row]:
         yield "adaptation", CAUTION, "frozen: " + ", ".join(sorted(health.frozen))
     if health.saturated:
         yield "saturated", CAUTION, ", ".join(sorted(health.saturated))
+    if health.refused:
+        yield "page", CAUTION, f"{health.refused} messages refused, see the log"
     if health.sparing:
         yield "page", CAUTION, "the processor is busy: fewer frames, no charts of each tick"
     if health.real_time_factor:

@@ -24,7 +24,6 @@ from uam_lab.cockpit.vehicle_health import Health
 from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
@@ -100,7 +99,7 @@ class Page:
             self._todo.get()()
         self._services.look()
         with self._server.atomic():
-            self._watch.look(self._show)
+            self._watch.look(self._take)
             self._move_cameras()
         now = time.monotonic()
         for gains in self._gains.values():
@@ -124,15 +123,10 @@ class Page:
 
     def _update_headline(self) -> None:
         self._health.silence = self._watch.silence
+        self._health.refused = self._watch.door.refusals.count
         shown = headline(self._health, self._options)
         if shown != self._shown:
             self._headline.content = self._shown = shown
-
-    def _show(self, topic: Topic, message: Any) -> None:
-        try:
-            self._take(topic, message)
-        except BadMessage as error:
-            self.say(False, f"{topic.name}: {error}")
 
     def _take(self, topic: Topic, message: Any) -> None:
         health = self._health
@@ -180,7 +174,7 @@ class Page:
         if node == "mission":
             health = self._health
             known = zip(("delay_warn", "delay_land"), health.delay_shares, strict=True)
-            health.delay_shares = tuple(values.get(name, old) for name, old in known)
+            health.delay_shares = tuple(float(values.get(name, old)) for name, old in known)
 
     def spare(self, sparing: bool) -> None:
         """Do without the charts of each tick, or show them again."""

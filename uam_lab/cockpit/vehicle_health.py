@@ -12,7 +12,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.supervision import PreflightCheck, State
 from uam_control.supervision.supervision_parameters import SupervisionLimits
-from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.messages.status import (
+    ERROR,
+    OK,
+    STALE,
+    WARN,
+    AutopilotState,
+    MissionStatus,
+    finite,
+)
 from uam_msgs_py.node.namespace import unlabelled
 
 GOOD, CAUTION, BAD, UNKNOWN = "good", "caution", "bad", "unknown"
@@ -55,6 +63,7 @@ class Health:
     # shares of the delay margin at which the mission warns and lands
     delay_shares: tuple[float, ...] = SHARES
     period: float = math.nan  # [s] of control
+    refused: int = 0  # messages that the page cannot use
     sparing: bool = False  # whether the page leaves out charts, as processor time is short
     _tracked: bool = False  # whether the errors come from /uam/tracking/error
 
@@ -83,8 +92,8 @@ class Health:
                 elif pair.key == "saturated":
                     change = set.add if pair.value == "True" else set.discard
                     change(self.saturated, name)
-                elif pair.key == TICK and pair.value:
-                    self.ticks[name] = 1e-3 * float(pair.value)
+                elif pair.key == TICK and (most := finite(pair.value)) is not None:
+                    self.ticks[name] = 1e-3 * most
 
     @property
     def latency(self) -> float:

@@ -11,9 +11,9 @@ from rclpy.qos import QoSProfile
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node.polling import listen, messages
-from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import SolePublisher
+from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.polling import listen
+from uam_msgs_py.node.rightful import RightfulNodes
 
 # Before the first tick of a simulated flight every publisher of the control loop counts its
 # subscribers. The cockpit must not be counted in place of another node, so it subscribes to LATE
@@ -52,7 +52,7 @@ class Watch:
     def __init__(self, node: Node, rightful: RightfulNodes):
         """rightful: whose messages are shown."""
         self._node, self._rightful = node, rightful
-        self._guards: dict[Topic, SolePublisher] = {}
+        self.door = Door(node, tells=True)
         self._late = False
         self._subscriptions: dict[Topic, Any] = {}
         self._arrivals: dict[Topic, float] = {}
@@ -63,24 +63,23 @@ class Watch:
     def _listen(self, topic: Topic) -> None:
         qos: QoSProfile = topic.qos if topic in EARLY else topics.NEWEST
         made = listen(self._node, topic, qos, raw=topic in SERIALIZED)
-        self._subscriptions[topic] = made
-        if topic.name in PUBLISHERS:
-            rightful = self._rightful.of(topic.name)
-            self._guards[topic] = SolePublisher(self._node, made, rightful, lambda: False)
+        self._subscriptions[topic] = self.door.guard(
+            made, topic.name, self._rightful, lambda: False
+        )
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
         """Call show(topic, message) for new messages: all of WHOLE, the newest of the others."""
         for topic, subscription in list(self._subscriptions.items()):
             newest = None
-            for message in messages(subscription, self._guards.get(topic)):
+            for message in self.door.messages(subscription):
                 if topic in WHOLE:
-                    show(topic, message)
+                    self.door.accepts(subscription, show, topic, message)
                 newest = message
             if newest is None:
                 continue
             self._arrivals[topic] = time.monotonic()
             if topic not in WHOLE:
-                show(topic, newest)
+                self.door.accepts(subscription, show, topic, newest)
         if topics.MISSION_STATUS in self._arrivals and not self._late:
             self._late = True
             for topic in LATE:
@@ -96,8 +95,9 @@ class Watch:
             if not sparing:
                 self._listen(topic)
             elif topic in self._subscriptions:
-                self._guards.pop(topic, None)
-                self._node.destroy_subscription(self._subscriptions.pop(topic))
+                left_out = self._subscriptions.pop(topic)
+                self.door.guards.pop(left_out, None)
+                self._node.destroy_subscription(left_out)
 
     @property
     def silence(self) -> float | None:

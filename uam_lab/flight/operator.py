@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,9 +18,18 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import ChecklistItem, read_items
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
+from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.polling import listen
 from uam_sim_bridge.ports import flights
 
+DECODE: dict[topics.Topic, Callable[[DiagnosticArray], Any]] = {
+    topics.MISSION_STATUS: MissionStatus.from_message,
+    topics.AUTOPILOT_STATE: AutopilotState.from_message,
+    topics.PREFLIGHT: lambda message: list(read_preflight(message)),
+    topics.CHECKLIST: lambda m: (ChecklistState.from_message(m), read_items(m)),
+}
 PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
+LOOK = 0.05  # [s] between two looks for messages
 AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
 PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as long for its answer
 
@@ -50,14 +60,9 @@ class Operator:
         self._node = node
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
-        self._newest: dict[str, DiagnosticArray] = {}
-        for topic in (
-            *(topics.MISSION_STATUS, topics.AUTOPILOT_STATE, topics.PREFLIGHT),
-            topics.CHECKLIST,
-        ):
-            node.create_subscription(
-                topic.type, topic.name, lambda m, name=topic.name: self._take(name, m), topic.qos
-            )
+        self._door = Door(node, tells=True)
+        self._newest: dict[topics.Topic, Any] = {}  # decoded
+        self._readers = {listen(node, topic): topic for topic in DECODE}
 
     @property
     def place(self) -> str:
@@ -116,21 +121,20 @@ class Operator:
 
     def mission(self) -> MissionStatus:
         """Return the mission's newest status. Raises NoFlight."""
-        return MissionStatus.from_message(self._latest(topics.MISSION_STATUS))[1]
+        return self._latest(topics.MISSION_STATUS)[1]
 
     def autopilot(self) -> AutopilotState:
         """Return the autopilot's newest state. Raises NoFlight."""
-        return AutopilotState.from_message(self._latest(topics.AUTOPILOT_STATE))[1]
+        return self._latest(topics.AUTOPILOT_STATE)[1]
 
     def preflight(self) -> list[PreflightCheck]:
         """Return the newest pre-arm report. Raises NoFlight."""
-        lines = read_preflight(self._latest(topics.PREFLIGHT))
-        return [PreflightCheck(*line) for line in lines]
+        return [PreflightCheck(*line) for line in self._latest(topics.PREFLIGHT)]
 
     def checklist(self) -> tuple[ChecklistState, list[ChecklistItem]]:
         """Return the newest state of the checklist, and its items. Raises NoFlight."""
-        message = self._latest(topics.CHECKLIST)
-        return ChecklistState.from_message(message)[1], read_items(message)
+        (_, state), items = self._latest(topics.CHECKLIST)
+        return state, items
 
     def checklist_command(self, name: str) -> tuple[bool, str]:
         """Call a service of the checklist, confirm or repeat; returns as `command`."""
@@ -140,18 +144,22 @@ class Operator:
         """Receive messages for `seconds` of wall time."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
-            self._executor.spin_once(timeout_sec=left)
+            self._spin(min(left, LOOK))
 
-    def _take(self, name: str, message: DiagnosticArray) -> None:
-        self._newest[name] = message
+    def _spin(self, seconds: float) -> None:
+        """Serve clients for at most `seconds`, then take the received messages."""
+        self._executor.spin_once(timeout_sec=seconds)
+        for inlet, topic in self._readers.items():
+            for found in self._door.decoded(inlet, DECODE[topic]):
+                self._newest[topic] = found
 
     def _latest(self, topic: topics.Topic) -> Any:
         """Return the newest message of a topic; the node may have sent it before this call."""
         self._until(
-            lambda: topic.name in self._newest,
+            lambda: topic in self._newest,
             f"no message on {self._node.resolve_topic_name(topic.name)}",
         )
-        return self._newest[topic.name]
+        return self._newest[topic]
 
     def _call(self, service: str) -> tuple[bool, str]:
         client = self._node.create_client(Trigger, service)
@@ -170,4 +178,4 @@ class Operator:
         while not done():
             if time.monotonic() > end:
                 raise NoFlight.seen_by(self._node, complaint)
-            self._executor.spin_once(timeout_sec=0.05)
+            self._spin(LOOK)

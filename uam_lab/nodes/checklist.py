@@ -41,7 +41,7 @@ from uam_msgs_py.messages.checklist import (
     ChecklistItem,
     checklist_message,
 )
-from uam_msgs_py.messages.status import OK, WARN, ChecklistState, diagnostic
+from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
@@ -249,11 +249,13 @@ class ChecklistNode:
         self._publisher.publish(checklist_message(stamp, state, self._items()))
         if wall >= self._diagnostics_due:
             self._diagnostics_due = wall + 1.0
-            values = {"step": state.step, "failing": state.failing, "unusable": self._feed.bad}
-            level = OK if state.passed else WARN
-            self._diagnostics.publish(
-                diagnostic(stamp, label(self._node), level, state.summary, values)
-            )
+            door = self._feed.door
+            values = {"step": state.step, "failing": state.failing, **door.values()}
+            level, summary = OK if state.passed else WARN, state.summary
+            if new := door.news():
+                level, summary = ERROR, "; ".join(new)
+                self._node.get_logger().error(summary)
+            self._diagnostics.publish(diagnostic(stamp, label(self._node), level, summary, values))
 
     def _record(self) -> None:
         """Write the record when something has been added."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
@@ -32,11 +33,11 @@ from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.serialized import Serialized
-from uam_msgs_py.messages.status import OK, WARN, AutopilotState, RadioState
+from uam_msgs_py.messages.status import OK, WARN, AutopilotState, RadioState, finite
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import unlabelled
-from uam_msgs_py.node.polling import listen, messages
-from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import SolePublisher
+from uam_msgs_py.node.polling import listen
+from uam_msgs_py.node.rightful import RightfulNodes
 
 # of every tick: not read in flight, to save processor time
 FAST = (topics.IMU, topics.JOINTS, topics.MOCAP, topics.SETPOINT)
@@ -57,7 +58,7 @@ POSE_AGE = "pose age at arrival, mean [ms]"  # in the diagnostics of the estimat
 class Feed:
     """Polls the topics through `node`, which is not spun.
 
-    `observation`: what the automatic items look at; `bad`: newest message that cannot be used.
+    `observation`: what the automatic items look at.
     """
 
     def __init__(
@@ -83,7 +84,6 @@ class Feed:
         self._magnet: bool | None = None
         self._heard: dict[str, float] = {}  # time.monotonic() of each node's diagnostics
         self._host_due = 0.0
-        self.bad = ""
         self._readers: dict[topics.Topic, Callable[[Any], None]] = {
             topics.IMU: self._on_imu,
             topics.JOINTS: self._on_joints,
@@ -96,16 +96,13 @@ class Feed:
             topics.PREFLIGHT: self._on_preflight,
             topics.DIAGNOSTICS: self._on_diagnostics,
         }
+        self.door = Door(node)
         self._subscriptions = {topic: self._listen(topic) for topic in (*FAST, *SLOW)}
 
-    def _listen(self, topic: topics.Topic) -> tuple[Any, SolePublisher | None]:
+    def _listen(self, topic: topics.Topic) -> Subscription:
         qos = topic.reading if topic in FAST else topic.qos
         made = listen(self._node, topic, qos, raw=topic in FAST)
-        guard = None
-        if topic.name in PUBLISHERS:
-            rightful = self._rightful.of(topic.name)
-            guard = SolePublisher(self._node, made, rightful, lambda: self._stamp > 0.0)
-        return made, guard
+        return self.door.guard(made, topic.name, self._rightful, lambda: self._stamp > 0.0)
 
     @property
     def now(self) -> float:
@@ -118,12 +115,9 @@ class Feed:
         for topic in (*SLOW, *FAST):
             if seen.armed and topic in FAST:
                 continue
-            made, guard = self._subscriptions[topic]
-            for message in messages(made, guard):
-                try:
-                    self._readers[topic](message)
-                except BadMessage as error:
-                    self.bad = f"{topic.name}: {error}"
+            inlet = self._subscriptions[topic]
+            for message in self.door.messages(inlet):
+                self.door.accepts(inlet, self._readers[topic], message)
         sample, rest_time = self._sample(), self._limits().rest_time
         self._window.span = rest_time
         if sample is not None:
@@ -225,5 +219,5 @@ class Feed:
             self._heard[name] = time.monotonic()
             level = LEVELS.get(status.level, BAD)
             self.observation.nodes[name] = NodeReport(0.0, level, status.message, values)
-            if values.get(POSE_AGE):
-                self.observation.pose_age = 1e-3 * float(values[POSE_AGE])
+            if (age := finite(values.get(POSE_AGE))) is not None:
+                self.observation.pose_age = 1e-3 * age

@@ -92,7 +92,7 @@ def _health(
 ) -> DiagnosticArray:
     """Return the node's /diagnostics entry: lost messages, loop times, connections.
 
-    new: lines about foreign publishers since the last entry.
+    new: lines about messages refused since the last entry.
     """
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
@@ -102,7 +102,7 @@ def _health(
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
     values |= connections.of(node, {}, recording.inlets)
     now = node.get_clock().now().nanoseconds
-    values["foreign publishers"] = "; ".join(recording.foreign)
+    values |= recording.door.values()
     level = ERROR if recording.ended else WARN if lost else OK
     if new and not recording.ended:
         level, summary = ERROR, "; ".join(new)
@@ -190,7 +190,6 @@ def main() -> int:
     services.add_node(node)
     polls_per_flush = max(1, round(options.flush_period / options.poll_period))
     polls, loop, ended = 0, LoopTime(), ""
-    foreign: list[str] = []  # lines about foreign publishers at the last report
     due = 0.0  # time.monotonic() of the next comparison
     while not stop.raised:
         time.sleep(options.poll_period)
@@ -207,12 +206,10 @@ def main() -> int:
             if recording.ended and not ended:
                 ended = recording.ended
                 log.error(f"{ended}; recorded until {recording.until / SECOND:g} s")
-            new = []
+            new: list[str] = []
             if time.monotonic() >= due:
                 due = time.monotonic() + DIAGNOSTICS_PERIOD
-                new = [line for line in recording.foreign if line not in foreign]
-                foreign = recording.foreign
-                if new:
+                if new := recording.door.news():
                     log.error("; ".join(new))
             health.publish(_health(node, recording, loop, new))
     recording.drain()

@@ -9,14 +9,14 @@ from typing import TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import Bool
 
 from uam_control.stamps import SECOND
 from uam_lab.recording import cdr
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import read_switch
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.namespace import expanded
@@ -137,7 +137,7 @@ class Log:
     def arming_commanded(self) -> bool:
         """Whether the mission asked for arming; True also for a log without its commands."""
         commands = self.messages(topics.ARMING)
-        return not commands or any(deserialize_message(one, Bool).data for one in commands)
+        return not commands or any(map(read_switch, commands))
 
     def statuses(self) -> list[tuple[int, MissionStatus]]:
         """Return stamps [ns] and statuses of the mission, in order."""
@@ -151,7 +151,7 @@ class Log:
         found, logged = [], self.messages(topic)
         for data in logged:
             with suppress(BadMessage):
-                found.append(decode(deserialize_message(data, DiagnosticArray)))
+                found.append(decode(deserialized(data, DiagnosticArray)))
         if missing := len(logged) - len(found):
             self.notes.append(f"{topic.name}: {missing} messages cannot be read; left out")
         return found

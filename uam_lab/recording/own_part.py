@@ -10,14 +10,15 @@ from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.messages.transforms import read_transforms, transforms_message
 from uam_msgs_py.node.namespace import prefix
 
-Filter = Callable[[bytes], bytes | None]  # a serialized message → the part to keep, None: nothing
+# a serialized message → the part to keep, None: nothing; raises BadMessage
+Filter = Callable[[bytes], bytes | None]
 
 
 def own_part(topic: topics.Topic, namespace: str) -> Filter | None:
@@ -33,10 +34,7 @@ def own_part(topic: topics.Topic, namespace: str) -> Filter | None:
 
 
 def _frames(data: bytes, own: str) -> bytes | None:
-    try:
-        every = read_transforms(data)
-    except BadMessage:
-        return None
+    every = read_transforms(data)
     kept = [one for one in every if one.parent.startswith(own) or one.child.startswith(own)]
     if len(kept) == len(every):
         return data
@@ -44,7 +42,7 @@ def _frames(data: bytes, own: str) -> bytes | None:
 
 
 def _statuses(data: bytes, own: str) -> bytes | None:
-    message = deserialize_message(data, DiagnosticArray)
+    message = deserialized(data, DiagnosticArray)
     kept = [status for status in message.status if status.name.startswith(own)]
     if len(kept) == len(message.status):
         return data
@@ -54,4 +52,4 @@ def _statuses(data: bytes, own: str) -> bytes | None:
 
 def _lines(data: bytes, own: str) -> bytes | None:
     """Keep the lines of loggers such as `uav1.mission`."""
-    return data if deserialize_message(data, Log).name.startswith(own.replace("/", ".")) else None
+    return data if deserialized(data, Log).name.startswith(own.replace("/", ".")) else None

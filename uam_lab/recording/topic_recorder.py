@@ -32,11 +32,13 @@ from uam_lab.recording.core_offers import CoreOffers
 from uam_lab.recording.own_part import Filter, own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.messages.serialized import type_name
+from uam_msgs_py.messages.serialized import deserialized, type_name
+from uam_msgs_py.messages.transforms import read_transforms
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import expanded
 from uam_msgs_py.node.polling import listen
-from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, publishers
+from uam_msgs_py.node.rightful import RightfulNodes
+from uam_msgs_py.node.sole_publisher import UNKNOWN, publishers
 from uam_msgs_py.node.taking import Taker
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
@@ -59,9 +61,17 @@ class Track:
     stamped: bool
     channel: int
     own: Filter | None
+    read: Callable[[bytes], object] | None = None  # raises BadMessage for bytes that are none
     arrived: float | None = None  # time.monotonic() of the newest message
     last_sequences: dict[bytes, int] = field(default_factory=dict)  # by publisher
     lost: dict[str, int] = field(default_factory=dict)  # by the publisher's node
+
+
+def _reader(topic: topics.Topic) -> Callable[[bytes], object]:
+    """Return the check of messages that anyone may send: other programs will read the log."""
+    if topic in (topics.TF, topics.TF_STATIC):
+        return read_transforms
+    return lambda data: deserialized(data, topic.type)
 
 
 class TopicRecorder:
@@ -87,7 +97,7 @@ class TopicRecorder:
         for name, values in (metadata or {}).items():
             self._writer.add_metadata(name, values)
         self._bag: list[BagTopic] = []
-        self._guards: list[SolePublisher] = []
+        self.door = Door(node)
         self._node, self._rightful = node, rightful
         self._offers = CoreOffers()
         self._tracks = [self._track(node, topic) for topic in chosen]
@@ -109,39 +119,44 @@ class TopicRecorder:
         self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
         channel = add_topic(self._writer, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
-        if topic.name in PUBLISHERS:  # a foreign message would be a row of the table
-            rightful = self._rightful.of(topic.name)
-            guard = SolePublisher(node, subscription, rightful, lambda: self._clock_sim != [])
-            self._guards.append(guard)
-            taker, take = guard.taker, guard.take
-        else:
-            taker = Taker(subscription)
-            take = taker.take
-        own = own_part(topic, self._namespace)
-        return Track(topic.name, subscription, taker, take, stamped, channel, own)
+        # a foreign message would be a row of the table
+        self.door.guard(subscription, topic.name, self._rightful, lambda: self._clock_sim != [])
+        own, guard = own_part(topic, self._namespace), self.door.guards.get(subscription)
+        if guard is not None:
+            return Track(topic.name, subscription, guard.taker, guard.take, stamped, channel, own)
+        taker, read = Taker(subscription), _reader(topic)
+        return Track(topic.name, subscription, taker, taker.take, stamped, channel, own, read)
 
     def poll(self) -> int:
         """Write all received messages; return their number."""
-        batch, now, offers = [], time.monotonic(), self._offers
+        batch: list[tuple[Track, bytes, int, int, int | None]] = []
+        now, offers = time.monotonic(), self._offers
         offers.begin()
+
+        def keep(track: Track, data: bytes, published: int, sequence: int) -> None:
+            """Note a message for the log; raises BadMessage."""
+            if track.read is not None:
+                track.read(data)
+            stamp = stamp_of(data) if track.stamped or track.topic == topics.CLOCK.name else None
+            if track.topic == topics.CLOCK.name:
+                self._clock_wall.append(published)
+                self._clock_sim.append(stamp)
+            own = data if track.own is None else track.own(data)
+            if own is not None:
+                batch.append((track, own, published, sequence, stamp if track.stamped else None))
+                track.arrived = now
+
         for track in self._tracks:
             taker, info = track.taker, track.taker.info
             while (data := track.take()) is not None:
                 published = info.source_timestamp
-                if track.topic == topics.CLOCK.name:
-                    self._clock_wall.append(published)
-                    self._clock_sim.append(stamp_of(data))
                 sequence = info.publication_sequence_number
                 self._count_lost(track, bytes(taker.gid), sequence)
-                data = data if track.own is None else track.own(data)
-                if data is None:
-                    continue
-                batch.append((track, data, published, sequence))
-                track.arrived = now
+                self.door.accepts(track.subscription, keep, track, data, published, sequence)
                 offers.after(len(batch))
-        for number, (track, data, published, sequence) in enumerate(batch):
+        for number, (track, data, published, sequence, stamp) in enumerate(batch):
             offers.after(number)
-            at = stamp_of(data) if track.stamped else self._sim_time(published)
+            at = self._sim_time(published) if stamp is None else stamp
             self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
         del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
         return len(batch)
@@ -171,11 +186,6 @@ class TopicRecorder:
             name = publishers(self._node, topic).get(gid, UNKNOWN)
             track.lost[name] = track.lost.get(name, 0) + sequence - 1 - last
         track.last_sequences[gid] = sequence
-
-    @property
-    def foreign(self) -> list[str]:
-        """One line per topic with foreign publishers."""
-        return complaints(self._guards)
 
     @property
     def inlets(self) -> dict[str, Subscription]:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
-import math
 import socket
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
 
 from uam_lab.recording.mcap_reader import UnreadableLog, read_log
 from uam_lab.recording.node_statistics import LABORATORY_FILE, statistics
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import deserialized
+from uam_msgs_py.messages.status import finite
 
 NAME = "devices.json"
 # node → name of the figure → key of /diagnostics; the median over the reports
@@ -51,8 +53,15 @@ def read(log: Path, logs: Path) -> dict[str, Any]:
     except (UnreadableLog, OSError):
         found = {}
     data = found[topics.DIAGNOSTICS.name].messages if found else []
-    figures = of_reports(values_of(deserialize_message(one, DiagnosticArray) for one in data))
+    figures = of_reports(values_of(_reports(data)))
     return figures | of_laboratory(statistics(logs / LABORATORY_FILE))
+
+
+def _reports(data: Iterable[bytes]) -> Iterator[DiagnosticArray]:
+    """Yield the messages of /diagnostics; anyone may have sent bytes that are none."""
+    for one in data:
+        with suppress(BadMessage):
+            yield deserialized(one, DiagnosticArray)
 
 
 def values_of(messages: Iterable[DiagnosticArray]) -> dict[str, list[Mapping[str, str]]]:
@@ -71,7 +80,7 @@ def of_reports(reports: Mapping[str, list[Mapping[str, str]]]) -> dict[str, floa
     for chosen, reduce in ((MEDIANS, median), (LARGEST, max)):
         for node, keys in chosen.items():
             for name, key in keys.items():
-                numbers = [_number(pairs.get(key)) for pairs in reports.get(node, ())]
+                numbers = [finite(pairs.get(key)) for pairs in reports.get(node, ())]
                 numbers = [number for number in numbers if number is not None]
                 if numbers:
                     figures[name] = round(reduce(numbers), 3)
@@ -136,11 +145,3 @@ def free_udp_port() -> int:
                 except OSError:
                     continue
                 return port
-
-
-def _number(text: str | None) -> float | None:
-    try:
-        value = float(text or "")
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

@@ -13,6 +13,7 @@ from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import OK
 from uam_msgs_py.node import polling
+from uam_msgs_py.node.door import Door
 
 LOOK = 0.2  # [s] between two looks
 AGAIN = 1.0  # [s] between two requests to start
@@ -48,12 +49,12 @@ class Starter(threading.Thread):
         """Watch the lists, request the start."""
         with self._guest("uam_rehearse") as guest:
             lists = polling.listen(guest.node, topics.CHECKLIST)
-            operator = Operator(guest.node)
+            operator, door = Operator(guest.node), Door(guest.node, tells=True)
             passed, most = not self._required, -1
             progress, asked = time.monotonic(), 0.0
             while not self._ended.wait(LOOK) and not self.started:
                 now = time.monotonic()
-                for message in polling.messages(lists):
+                for message in door.messages(lists):
                     passed = passed or list_passed(message)
                     self.waits_for = list_text(message)
                     if (count := passed_items(message)) > most:  # not those that come and go

@@ -22,7 +22,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.connections import Connections
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import listen, messages
+from uam_msgs_py.node.polling import listen
 
 LINGER = 4.0  # [s] after the mission, in which the autopilot disarms and closes its log
 LOOK_PERIOD = 0.5  # [s] between two looks at the devices
@@ -80,7 +80,7 @@ class VehicleCourse:
 
     def _look(self, now: float) -> None:
         """Take the diagnostics; every LOOK_PERIOD report the devices."""
-        for message in messages(self._diagnostics):
+        for message in self._listener.door.messages(self._diagnostics):
             self._connections.note(message)
             for status in message.status:
                 name = status.name.removeprefix(self._prefix)

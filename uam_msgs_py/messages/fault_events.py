@@ -6,6 +6,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from uam_msgs_py.messages.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import OK, WARN, diagnostic, only_status
 
@@ -40,7 +41,7 @@ class FaultEvent:
         try:
             stamp, status, texts = only_status(message)
             number, place = int(texts.pop(NUMBER)), texts.pop("place")
-            parameters = {name: json.loads(text) for name, text in texts.items()}
+            parameters = {name: read_json(text) for name, text in texts.items()}
             active = {BEGUN: True, OVER: False}[status.message]
         except (KeyError, ValueError):
             raise BadMessage("not a fault") from None

@@ -22,11 +22,17 @@ ENCAPSULATION = 4
 STAMP = slice(4, 12)  # std_msgs/Header and rosgraph_msgs/Clock begin with it
 KNOWN_LAYOUTS = 32  # stored per message type
 MOST_NAMES = 1000  # of a message
+LONGEST_TEXT = 300  # characters of what is wrong
 _STAMP = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
 
 
 class BadMessage(ValueError):
     """An invalid message; the text is one line: what is wrong, what is expected."""
+
+    def __init__(self, text: str) -> None:
+        """text: may contain parts of the message, of any length."""
+        line = " ".join(text.split())
+        super().__init__(line if len(line) <= LONGEST_TEXT else f"{line[:LONGEST_TEXT]}...")
 
 
 def is_little_endian(data: bytes) -> bool:

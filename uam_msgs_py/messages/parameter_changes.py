@@ -3,10 +3,12 @@
 import json
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from uam_msgs_py.messages.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import OK, WARN, diagnostic, only_status
 
@@ -14,6 +16,8 @@ ACCEPTED = "accepted"
 REFUSED = "refused: "
 ARROW = " -> "
 BY = "by"
+PARAMETER_LEVELS = 2  # a value, or a list of values
+MOST_ARROWS = 20  # that are tried in a text
 
 
 @dataclass(frozen=True)
@@ -66,9 +70,10 @@ def _plain(value: Any) -> Any:
 
 def _pair(text: str) -> tuple[Any, Any]:
     """Return the old and new value of a text of `to_message`; a value may contain ARROW itself."""
-    for arrow in re.finditer(re.escape(ARROW), text):
+    for arrow in islice(re.finditer(re.escape(ARROW), text), MOST_ARROWS):
         try:
-            return json.loads(text[: arrow.start()]), json.loads(text[arrow.end() :])
+            old, new = text[: arrow.start()], text[arrow.end() :]
+            return read_json(old, PARAMETER_LEVELS), read_json(new, PARAMETER_LEVELS)
         except ValueError:
             continue
     raise ValueError(text)

@@ -13,6 +13,7 @@ from typing import Self
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from uam_msgs_py.messages.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ERROR, OK, STALE
 
@@ -97,8 +98,8 @@ class ParameterComparison:
 
 
 def _difference(name: str, text: str) -> ParameterDifference:
-    entry = json.loads(text)
+    entry = read_json(text)
     found = entry["found"]
     return ParameterDifference(
-        name, None if found is None else float(found), entry["required"], entry["why"]
+        name, None if found is None else float(found), str(entry["required"]), str(entry["why"])
     )

@@ -35,6 +35,7 @@ def type_name(message_type: type) -> str:
     return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
 
 
+MOST_BYTES = 1_000_000  # of a message that is deserialized: these take a third of a second
 KINDS = (JointTrajectory, JointState, Imu, PoseStamped, TwistStamped, Float64MultiArray, Clock)
 LAYOUTS = {kind: Layouts(type_name(kind)) for kind in KINDS}
 
@@ -93,7 +94,7 @@ class Serialized:
     def __init__(self, kind: type, data: bytes):
         """kind: a type in LAYOUTS. Raises BadMessage."""
         if not is_little_endian(data):
-            data = _converted(kind, data)
+            data = serialize_message(deserialized(data, kind))
         self.data = data
         self.layout: Layout = LAYOUTS[kind].of(data)
 
@@ -128,10 +129,12 @@ def all_finite(values: np.ndarray) -> bool:
     return math.isfinite(sum(values.ravel().tolist()))
 
 
-def _converted(kind: type, data: bytes) -> bytes:
-    """Return the message in the byte order of this machine."""
+def deserialized(data: bytes, kind: type) -> Any:
+    """Return the message of type `kind`; raises BadMessage for bytes that are none, or too many."""
+    if len(data) > MOST_BYTES:
+        raise BadMessage(f"{len(data)} bytes, at most {MOST_BYTES} allowed")
     try:
-        return serialize_message(deserialize_message(data, kind))
+        return deserialize_message(data, kind)
     except Exception as error:  # rclpy raises its own classes, without a common base
         raise BadMessage(f"cannot be deserialized ({error})") from None
 

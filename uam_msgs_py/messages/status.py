@@ -1,5 +1,6 @@
 """States in a diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
 
+import math
 from dataclasses import dataclass, fields
 from typing import ClassVar, Self
 
@@ -80,12 +81,28 @@ def _truth(text: str) -> bool:
     return text == "True"
 
 
+def _whole(text: str) -> int:
+    value = int(text)
+    if not -(1 << 63) <= value < 1 << 63:
+        raise ValueError(text)
+    return value
+
+
+def finite(text: str | None) -> float | None:
+    """Return the number of a text, None for anything else; for values of /diagnostics."""
+    try:
+        value = float(text or "")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
 _READ = {
     str: str,
     float: float,
     bool: _truth,
-    int: int,
-    int | None: lambda text: int(text) if text else None,
+    int: _whole,
+    int | None: lambda text: _whole(text) if text else None,
     float | None: lambda text: float(text) if text else None,
 }
 

@@ -18,17 +18,25 @@ def answered(service: Service) -> bool:
     If the callback raises, the response has what it filled in so far: without anything, that of
     our services and of set_parameters_atomically is a refusal.
     """
-    request, header = service.handle.service_take_request(service.srv_type.Request)
+    try:
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+    except Exception as error:  # bytes that are no request
+        _tell(service, error)
+        return True
     if header is None:
         return False
     response = service.srv_type.Response()
     try:
         response = service.callback(request, response)
     except Exception as error:
-        text = f"{service.service_name}: request refused: {type(error).__name__}: {error}"
-        get_logger(service.logger_name).error(text)
+        _tell(service, error)
     service.send_response(response, header)
     return True
+
+
+def _tell(service: Service, error: Exception) -> None:
+    text = f"{service.service_name}: request refused: {type(error).__name__}: {error}"
+    get_logger(service.logger_name).error(text)
 
 
 class ServingExecutor(SingleThreadedExecutor):

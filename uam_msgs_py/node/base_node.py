@@ -21,11 +21,12 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_control.settings.visible_text import visible
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import BadMessage, stamp_of
+from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import connections, log_callers, polling, process_options
+from uam_msgs_py.node.door import LOG_PERIOD
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
@@ -33,9 +34,7 @@ from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.local_delivery import LocalDelivery, Outlet
 from uam_msgs_py.node.namespace import adopt_sections, expanded, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
-from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
 from uam_msgs_py.node.stamp_watch import StampWatch
 from uam_msgs_py.node.tick_times import DECODE, PUBLISH, tick_times
 from uam_msgs_py.node.tunable import TunableNode
@@ -43,7 +42,6 @@ from uam_msgs_py.node.tunable import TunableNode
 DIAGNOSTICS_PERIOD = 1.0  # s
 END_PATIENCE = 6.0  # s, for the middleware at a node's end; `uam fly` waits 10 s
 REFUSED = 2  # exit status
-LOG_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
 
 N = TypeVar("N", bound=Node)
 
@@ -67,14 +65,10 @@ class UamNode(TunableNode):
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
-        self._logged: dict[str, float] = {}
         self._outlets: dict[str, Publisher | Outlet] = {}
         self._inlets: dict[str, Subscription] = {}
-        self.sole_publishers: dict[Subscription, SolePublisher] = {}
         self.rightful = rightful_nodes(self)
-        self._refusals = Refusals()
         self._stamps = StampWatch()
-        self._complaints: list[str] = []  # at the last report
         self.joins: list[StampJoin] = []
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
         self.ticks = 0
@@ -111,7 +105,7 @@ class UamNode(TunableNode):
         qos: QoSProfile | None = None,
         raw: bool = False,
     ) -> Subscription:
-        """Call `handle(message)` for each message; if it raises BadMessage, `refuse` it.
+        """Call `handle(message)` for each message; if it raises, refuse the message.
 
         The message is serialized if `raw`, or if uam_msgs_py.messages.serialized reads its type.
         required: the node reports that it waits while no message arrives. qos: None for
@@ -124,22 +118,19 @@ class UamNode(TunableNode):
 
         stamped = name in PUBLISHERS and stays_stamped(topic.type)
 
+        def checked(message: Any) -> None:
+            if stamped:
+                self._check_stamp(name, stamp_of(message))
+            handle(message)
+
         def callback(message: Any) -> None:
-            try:
-                if stamped:
-                    self._check_stamp(name, stamp_of(message))
-                handle(message)
-            except BadMessage as error:
-                self.refuse(name, error)
-                return
-            counts[name] += 1
-            arrivals[name] = time.monotonic()
+            if self.door.accepts(made, checked, message):
+                counts[name] += 1
+                arrivals[name] = time.monotonic()
 
         raw = raw or stays_serialized(topic.type)
         made = self._inlets[name] = self._subscription(topic, callback, qos or topic.reading, raw)
-        if name in PUBLISHERS:
-            rightful = self.rightful.of(name)
-            self.sole_publishers[made] = SolePublisher(self, made, rightful, lambda: self.ticks > 0)
+        self.door.guard(made, name, self.rightful, lambda: self.ticks > 0)
         self._stamps.listen(name)
         if self._delivery is not None:
             self._delivery.note(self, name, made)
@@ -161,19 +152,9 @@ class UamNode(TunableNode):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
-    def refuse(self, name: str, error: BadMessage) -> None:
-        """Count a message of topic `name` that cannot be used; the next report names its sender."""
-        guard = self.sole_publishers.get(self._inlets[name])
-        topic = self.resolve_topic_name(name)
-        if guard is None:
-            sender = rightful = " or ".join(publishers(self, topic).values())
-        else:
-            sender, rightful = guard.rightful, guard.publisher
-        self._refusals.note(self._absolute(name), sender, rightful, str(error))
-
     def _check_stamp(self, name: str, stamp: int) -> None:
         clock = self._inlets.get(self._stamps.clock)
-        guard = None if clock is None else self.sole_publishers.get(clock)
+        guard = None if clock is None else self.door.guards.get(clock)
         self._stamps.check(name, stamp, "" if guard is None else guard.publisher)
 
     def take_waiting(self, subscription: Subscription) -> None:
@@ -186,7 +167,7 @@ class UamNode(TunableNode):
         if self._delivery is not None:
             self._delivery.take_waiting(subscription)
             return
-        for message in polling.messages(subscription, self.sole_publishers.get(subscription)):
+        for message in self.door.messages(subscription):
             subscription.callback(message)
 
     def defer(self) -> None:
@@ -206,9 +187,7 @@ class UamNode(TunableNode):
 
     def warn(self, text: str, key: str | None = None) -> None:
         """Log a warning, at most once per LOG_PERIOD for each `key` (default: the text)."""
-        now = time.monotonic()
-        if now - self._logged.get(key or text, -LOG_PERIOD) >= LOG_PERIOD:
-            self._logged[key or text] = now
+        if self.door.due(key or text):
             self.get_logger().warning(text)
 
     def done_tick(self, stamp: int, begun: float) -> None:
@@ -256,9 +235,7 @@ class UamNode(TunableNode):
         done = self.ticks - ticks
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
-        foreign, bad = complaints(self.sole_publishers.values()), self._refusals.texts()
-        before, self._complaints = self._complaints, foreign + bad
-        if new := [text for text in self._complaints if text not in before]:
+        if new := self.door.news():
             level, summary = ERROR, "; ".join(new)
             self.get_logger().error(summary)
         elif self._waiting and level < ERROR:
@@ -272,9 +249,7 @@ class UamNode(TunableNode):
             "tick rate [Hz]": f"{done / (now - last):.1f}" if last else "",
             **self._loop.report(),
             "incomplete ticks dropped": dropped,
-            "messages refused": self._refusals.count,
-            "unusable messages": "; ".join(bad),
-            "foreign publishers": "; ".join(foreign),
+            **self.door.values(),
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import finite
 from uam_msgs_py.node.namespace import expanded, prefix
 
 NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has a node's name
@@ -85,4 +86,4 @@ class Connections:
     def count(self, node: str, kind: str, topic: str) -> int:
         """Return the number of READERS or WRITERS (kind) of `topic` that `node` is connected to."""
         values = self._values.get(prefix(self._namespace) + node, {})
-        return int(values.get(kind + expanded(self._namespace, topic), 0))
+        return int(finite(values.get(kind + expanded(self._namespace, topic))) or 0)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable
 
 from rclpy.node import Node
 
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.other_entities import OtherEntities
 from uam_msgs_py.node.tick_times import DECODE, TAKE, NoTickTimes
 from uam_msgs_py.node.waiting import WaitSet, wait_for
@@ -22,7 +23,7 @@ class LeanExecutor:
     """Spins one node; create its subscriptions, services and timers before.
 
     After a wake-up messages are delivered in the order of the node's subscriptions, triggers last.
-    An exception of a callback ends `spin`.
+    A message whose callback raises is refused, see `Door`; an exception of `settle` ends `spin`.
 
     If the node has `defer` and `settle`, `settle` is called after all received messages of a
     wake-up are delivered; the node then has its whole backlog.
@@ -50,6 +51,7 @@ class LeanExecutor:
         self._node = node
         self._trigger_names = set(getattr(node, "triggers", ()) if triggers is None else triggers)
         self._stalled = stalled or getattr(node, "stalled", lambda: False)
+        self._door = getattr(node, "door", None) or Door(node, tells=True)
         self._rest = OtherEntities([node])
         self._settle = getattr(node, "settle", lambda: None)
         if hasattr(node, "defer"):
@@ -65,10 +67,7 @@ class LeanExecutor:
         node = self._node
         names = {node.resolve_topic_name(name) for name in self._trigger_names}
         by_trigger = sorted(node.subscriptions, key=lambda s: s.topic_name in names)
-        guards = getattr(node, "sole_publishers", {})
-        self._subscriptions = [
-            (guards.get(s, s.handle), s.msg_type, s.raw, s.callback) for s in by_trigger
-        ]
+        self._subscriptions = by_trigger
         self._triggers = [s.handle for s in by_trigger if s.topic_name in names]
         self._inputs = [s.handle for s in by_trigger]
         self._messages = WaitSet(len(self._subscriptions), 0, 0, 0, 0, 0, node.context.handle)
@@ -91,10 +90,11 @@ class LeanExecutor:
         inputs = self._inputs if not self._triggers or self._stalled() else self._triggers
         wait_for(self._messages, inputs, min(timeout, left), self._busy_poll)
         times.woken()
-        for handle, kind, raw, callback in self._subscriptions:
-            while (taken := handle.take_message(kind, raw)) is not None:
+        door = self._door
+        for subscription in self._subscriptions:
+            for message in door.messages(subscription):
                 times.lap(TAKE)
-                callback(taken[0])
+                door.accepts(subscription, subscription.callback, message)
                 times.lap(DECODE)
         times.lap(TAKE)
         self._settle()

@@ -32,6 +32,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_stamped
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import wiring
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.rightful import PARAMETER, PUBLISHERS, Rightful, RightfulNodes, full_name
 from uam_msgs_py.node.sole_publisher import LocalPublisher, SolePublisher
 from uam_msgs_py.node.taking import identity
@@ -44,7 +45,7 @@ class ReadingNode(Protocol):
     """What this module uses of `base_node.UamNode`."""
 
     rightful: RightfulNodes
-    sole_publishers: dict[Subscription, SolePublisher]
+    door: Door
     triggers: tuple[str, ...]
 
     def get_name(self) -> str: ...
@@ -88,22 +89,25 @@ class Outlet:
 class Inlet:
     """A subscription that is read for one or several nodes: `take` calls all `callbacks`."""
 
-    def __init__(self, reader: _Reader, guard: SolePublisher | None) -> None:
-        """reader: the first of them; guard: of its subscription, if any."""
-        self.subscription, self.guard = reader.subscription, guard
+    def __init__(self, reader: _Reader) -> None:
+        """reader: the first of them."""
+        self.subscription, self._door = reader.subscription, reader.node.door
         self.callbacks = [reader.subscription.callback]
         self.times = NoTickTimes()  # of the process
 
     def take(self) -> None:
         """Deliver all received messages now, oldest first."""
-        subscription, times = self.subscription, self.times
-        kind, raw = subscription.msg_type, subscription.raw
-        take = (self.guard or subscription.handle).take_message
-        while (taken := take(kind, raw)) is not None:
+        times = self.times
+        for message in self._door.messages(self.subscription):
             times.lap(TAKE)
             for callback in self.callbacks:
-                callback(taken[0])
+                callback(message)
             times.lap(DECODE)
+
+    @property
+    def guard(self) -> SolePublisher | None:
+        """Guard of the subscription, if any."""
+        return self._door.guards.get(self.subscription)
 
 
 class _Reader:
@@ -217,7 +221,7 @@ class LocalDelivery:
         outlet.readers.append(deliver)
         self._local[subscription] = outlet
         guard = LocalPublisher(node, subscription, publisher, identity(outlet.publisher))
-        node.sole_publishers[subscription] = guard
+        node.door.guards[subscription] = guard
         self.watched.append(guard)
 
     def _with_another_turn(self, deliver: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -232,12 +236,11 @@ class LocalDelivery:
         subscription, node = reader.subscription, reader.node
         inlet = self.inlets.get(reader.topic)
         if inlet is None:
-            guard = node.sole_publishers.get(subscription)
-            inlet = self.inlets[reader.topic] = Inlet(reader, guard)
+            inlet = self.inlets[reader.topic] = Inlet(reader)
         else:
             inlet.callbacks.append(subscription.callback)
             if inlet.guard is not None:
-                node.sole_publishers[subscription] = inlet.guard
+                node.door.guards[subscription] = inlet.guard
         self._sources[subscription] = inlet
 
     def take_waiting(self, subscription: Subscription) -> None:

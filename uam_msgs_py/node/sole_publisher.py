@@ -15,10 +15,8 @@ from __future__ import annotations
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.node.connections import NAMELESS
@@ -78,13 +76,12 @@ class SolePublisher:
                 return data
         return None
 
-    def take_message(self, kind: type, raw: bool) -> tuple[Any, dict[str, int]] | None:
-        """Return the next message and its times, as rclpy's handle does."""
+    def take_message(self, kind: type, raw: bool) -> tuple[bytes, dict[str, int]] | None:
+        """Return the next serialized message and its times, as rclpy's handle does for `raw`."""
         data = self.take()
         if data is None:
             return None
-        message = data if raw else deserialize_message(data, kind)
-        return message, {"source_timestamp": self.taker.info.source_timestamp}
+        return data, {"source_timestamp": self.taker.info.source_timestamp}
 
     @property
     def refused(self) -> dict[str, int]:

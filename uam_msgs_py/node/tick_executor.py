@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 from rclpy.subscription import Subscription
 
-from uam_msgs_py.node import polling
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.local_delivery import Inlet, LocalDelivery
 from uam_msgs_py.node.other_entities import OtherEntities
@@ -115,8 +114,8 @@ class TickExecutor:
         for guard in self._delivery.watched:
             guard.take()
         for subscription in self._unknown:
-            for message in polling.messages(subscription):
-                subscription.callback(message)
+            for message in self._nodes[0].door.messages(subscription):
+                self._nodes[0].door.accepts(subscription, subscription.callback, message)
         left, changed = self._rest.serve(stamp)
         self._at_rest()
         if changed:

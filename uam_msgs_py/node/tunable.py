@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import adopt_sections
 from uam_msgs_py.node.node_parameters import NodeParameters
 
@@ -31,6 +32,7 @@ class TunableNode(Node):
         super().__init__(name)
         adopt_sections(self)
         self.stamp = 0  # [ns] of the newest tick
+        self.door = Door(self)
         self._changes = self.create_publisher(
             topics.CHANGES.type, topics.CHANGES.name, topics.CHANGES.qos
         )

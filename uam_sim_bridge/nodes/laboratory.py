@@ -27,7 +27,6 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.answering import ServingExecutor
@@ -182,20 +181,15 @@ class Rehearsal:
 
     def _listen(self) -> None:
         """Take the mission's status and the step of the checklist."""
-        for message in polling.messages(self._mission_topic):
-            try:
-                stamp, self._mission = MissionStatus.from_message(message)
-            except BadMessage:
-                continue
+        door = self._node.door
+        for stamp, mission in door.decoded(self._mission_topic, MissionStatus.from_message):
+            self._mission = mission
             shift = self.clock.host(0)
             self._cables.timeline.mission_at(
                 stamp / SECOND - shift, self._mission.time, self._mission.phase
             )
-        for message in polling.messages(self._checklist):
-            try:
-                self._list = ChecklistState.from_message(message)[1]
-            except BadMessage:
-                continue
+        for _, state in door.decoded(self._checklist, ChecklistState.from_message):
+            self._list = state
 
     def _be_the_person(self, chi: np.ndarray) -> None:
         if not self._p.person:

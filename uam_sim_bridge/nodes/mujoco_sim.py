@@ -39,7 +39,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
-from uam_msgs_py.node import polling, wiring
+from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
@@ -184,7 +184,7 @@ class Simulator:
         end = time.monotonic() + LATCHED_WAIT
         while not newest and time.monotonic() < end:
             time.sleep(0.02)
-            for message in polling.messages(reader):
+            for message in self.node.door.messages(reader):
                 newest = max(newest, from_message(message.header.stamp))
         self.node.destroy_subscription(reader)
         return newest

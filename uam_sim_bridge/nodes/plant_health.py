@@ -11,7 +11,6 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import label
-from uam_msgs_py.node.sole_publisher import complaints
 from uam_sim_bridge.nodes.plant_options import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
@@ -30,7 +29,7 @@ class PlantHealth:
         self._answers, self._statistics = answers, statistics
         self._loop = LoopTime()
         self._ticks = 0
-        self._log, self._complaints = node.get_logger(), []
+        self._log, self._door = node.get_logger(), node.door
         self._missed = 0
         self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
 
@@ -59,18 +58,15 @@ class PlantHealth:
         wall, before = self._last
         now = time.monotonic()
         self._last = now, simulated
-        foreign, bad = complaints(self._answers.guards.values()), self._answers.refusals.texts()
-        if new := [text for text in foreign + bad if text not in self._complaints]:
+        if new := self._door.news():
             level, summary = ERROR, "; ".join(new)
             self._log.error(summary)
-        self._complaints = foreign + bad
         values = {
             "ticks": self._ticks,
             "real time factor": f"{(simulated - before) / (now - wall):.2f}",
             "ticks missed": self._statistics.missed_ticks,
             "late motor commands": self._statistics.late_motor_commands,
-            "unusable messages": "; ".join(bad),
-            "foreign publishers": "; ".join(foreign),
+            **self._door.values(),
         }
         values |= self._loop.report() | ages(
             self._answers.inlets, self._answers.arrivals, self._namespace

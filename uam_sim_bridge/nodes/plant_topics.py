@@ -23,14 +23,12 @@ from uam_msgs_py.messages.convert import (
     read_joint_command,
     read_switch,
 )
-from uam_msgs_py.messages.layouts import BadMessage, stamp_of
+from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import frame
-from uam_msgs_py.node.refusals import Refusals
-from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import SolePublisher
+from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.tick_times import NoTickTimes
 from uam_sim_bridge.plant import Samples, Truth
 
@@ -153,8 +151,7 @@ class RecorderProgress:
         inlet = node.create_subscription(
             topic.type, topic.name, self._on_progress, topic.qos, raw=True, event_callbacks=events
         )
-        guard = SolePublisher(node, inlet, rightful.of(topic.name), lambda: self.until > 0)
-        node.sole_publishers = node.sole_publishers | {inlet: guard}
+        node.door.guard(inlet, topic.name, rightful, lambda: self.until > 0)
 
     def _on_progress(self, data: bytes) -> None:
         self.until = stamp_of(data)
@@ -188,7 +185,7 @@ class Answers:
     ):
         """servo_mode: of SERVO_MODES; only the commands of this mode are used."""
         self._names = list(vehicle.joint_names)
-        self.refusals = Refusals()
+        self._door = node.door
         to_goals = servo_mode == POSITION_SERVO
         self._arm_topic = topics.ARM_GOALS if to_goals else topics.ARM_EFFORT
         # NaN: no goal yet, the servos hold their position
@@ -217,12 +214,8 @@ class Answers:
                 (topics.RESTARTS, self._on_restart, False),
             )
         }
-
-        self.guards = node.sole_publishers = {
-            inlet: SolePublisher(node, inlet, rightful.of(name), lambda: self.begun)
-            for name, inlet in self.inlets.items()
-            if name in PUBLISHERS
-        }
+        for name, inlet in self.inlets.items():
+            self._door.guard(inlet, name, rightful, lambda: self.begun)
 
     def forget_mission(self) -> None:
         """Put the state of the mission back to that before its first message."""
@@ -252,16 +245,11 @@ class Answers:
     def take(self) -> None:
         """Take every message in the queues, without waiting."""
         for subscription in self.inlets.values():
-            take = self.guards.get(subscription, subscription.handle).take_message
-            while (taken := take(subscription.msg_type, subscription.raw)) is not None:
-                subscription.callback(*taken)
+            for taken in self._door.taken(subscription):
+                self._door.accepts(subscription, subscription.callback, *taken)
 
     def _on_setpoint(self, data: bytes, info: dict | None = None) -> None:
-        try:
-            self._setpoint_stamp = stamp_of(data)
-        except BadMessage as error:
-            self._refuse(topics.SETPOINT, error)
-            return
+        self._setpoint_stamp = stamp_of(data)
         self._arrived.add(SETPOINT)
         self.arrivals[topics.SETPOINT.name] = time.monotonic()
         if info is not None:
@@ -270,36 +258,19 @@ class Answers:
     def _on_arm(self, topic: topics.Topic, data: bytes, info: dict | None = None) -> None:
         if topic is self._arm_topic:
             self._arrived.add(ARM)
-        try:
-            command = read_joint_command(data, self._names)
-        except BadMessage as error:
-            self._refuse(topic, error)
-            return
+        command = read_joint_command(data, self._names)
         if topic is self._arm_topic:
             self.arm_command = command
             self.arrivals[topic.name] = time.monotonic()
 
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
         self._arrived.add(MAGNET)
-        try:
-            self.magnet = read_switch(data)
-        except BadMessage as error:
-            self._refuse(topics.MAGNET, error)
-            return
+        self.magnet = read_switch(data)
         self.arrivals[topics.MAGNET.name] = time.monotonic()
 
     def _on_restart(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.restarts += 1
 
     def _on_mission(self, message: DiagnosticArray, info: dict | None = None) -> None:
-        try:
-            self.mission_stamp, self.mission = MissionStatus.from_message(message)
-        except BadMessage as error:
-            self._refuse(topics.MISSION_STATUS, error)
-            return
+        self.mission_stamp, self.mission = MissionStatus.from_message(message)
         self.arrivals[topics.MISSION_STATUS.name] = time.monotonic()
-
-    def _refuse(self, topic: topics.Topic, error: BadMessage) -> None:
-        inlet = self.inlets[topic.name]
-        guard = self.guards[inlet]
-        self.refusals.note(inlet.topic_name, guard.rightful, guard.publisher, str(error))

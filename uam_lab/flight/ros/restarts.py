@@ -10,20 +10,22 @@ from rclpy.node import Node
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import WARN, diagnostic
+from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import decoded, listen
+from uam_msgs_py.node.polling import listen
 
 
 class ChangedParameters:
     """Subscription to /uam/parameter_changes; polled, so it needs no executor."""
 
-    def __init__(self, node: Node) -> None:
-        self._subscription = listen(node, topics.CHANGES)
+    def __init__(self, node: Node, door: Door) -> None:
+        """door: of the node."""
+        self._subscription, self._door = listen(node, topics.CHANGES), door
         self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
 
     def poll(self) -> None:
         """Store the received changes."""
-        for _, change in decoded(self._subscription, ParameterChange.from_message):
+        for _, change in self._door.decoded(self._subscription, ParameterChange.from_message):
             self.note(change)
 
     def note(self, change: ParameterChange) -> None:

@@ -13,9 +13,9 @@ from uam_lab.flight.observer import FlightStatus
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
-from uam_msgs_py.node.polling import decoded, listen
+from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
-from uam_msgs_py.node.sole_publisher import SolePublisher
 
 # The topic keeps one message; here no change of phase may be lost between two polls.
 EVERY_STATUS = QoSProfile(
@@ -41,13 +41,9 @@ class StatusListener(Guest):
         self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
         self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
         rightful = RightfulNodes(self.node.get_namespace(), publishers)
-        self._guards = {
-            made: SolePublisher(self.node, made, rightful.of(topic.name), lambda: False)
-            for made, topic in (
-                (self._mission, topics.MISSION_STATUS),
-                (self._autopilot, topics.AUTOPILOT_STATE),
-            )
-        }
+        self.door = Door(self.node, tells=True)
+        self.door.guard(self._mission, topics.MISSION_STATUS.name, rightful, lambda: False)
+        self.door.guard(self._autopilot, topics.AUTOPILOT_STATE.name, rightful, lambda: False)
         self._state = AutopilotState()
         self._heard = False  # whether the autopilot's state is known
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
@@ -57,10 +53,9 @@ class StatusListener(Guest):
 
     def poll(self) -> list[FlightStatus]:
         """Return the status messages received since the last call."""
-        guard = self._guards[self._autopilot]
-        for _, state in decoded(self._autopilot, AutopilotState.from_message, guard):
+        for _, state in self.door.decoded(self._autopilot, AutopilotState.from_message):
             self._state, self._heard = state, True
-        found = list(decoded(self._mission, self._status, self._guards[self._mission]))
+        found = list(self.door.decoded(self._mission, self._status))
         self.newest = found[-1:] or self.newest
         return found
 

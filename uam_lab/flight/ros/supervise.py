@@ -107,7 +107,8 @@ def _watch(
     course: Course,
 ) -> None:
     """Show the progress while the flight goes on. Raises NodeFailed."""
-    restarts, changed = RestartTopic(listener.node), ChangedParameters(listener.node)
+    restarts = RestartTopic(listener.node)
+    changed = ChangedParameters(listener.node, listener.door)
     while course.goes_on():
         changed.poll()
         for lost in children.revive(changed.arguments):

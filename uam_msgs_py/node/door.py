@@ -1,0 +1,145 @@
+"""The one way of received messages into a program: what it cannot use is refused and counted.
+
+Anyone may publish anything: bytes that are no message of the topic's type, texts and numbers that
+no reader expects. None of it ends a program. The next good message is used.
+
+Messages are taken serialized: rclpy would raise for bytes that are none, and the middleware would
+discard them without a word.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import deserialized
+from uam_msgs_py.node.refusals import Refusals
+from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
+from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
+
+LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
+NAMES_PERIOD = 1.0  # s of wall time between two looks at who publishes a topic
+
+T = TypeVar("T")
+
+
+class Door:
+    """The messages of a node's subscriptions.
+
+    `guards`: of subscriptions with a rightful publisher. The node announces `news` in /diagnostics
+    and its log.
+    """
+
+    def __init__(self, node: Node, tells: bool = False):
+        """tells: a refusal is logged here, for a node without /diagnostics."""
+        self.guards: dict[Subscription, SolePublisher] = {}
+        self.refusals = Refusals()
+        self._node, self._tells = node, tells
+        self._names: dict[str, tuple[float, str]] = {}  # topic → when looked, who publishes it
+        self._before: list[str] = []  # complaints at the last news
+        self._logged: dict[str, float] = {}
+
+    def guard(
+        self,
+        subscription: Subscription,
+        name: str,
+        rightful: RightfulNodes,
+        works: Callable[[], bool],
+    ) -> Subscription:
+        """Take only the rightful node's messages, if the topic has one; see SolePublisher."""
+        if name in PUBLISHERS:
+            self.guards[subscription] = SolePublisher(
+                self._node, subscription, rightful.of(name), works
+            )
+        return subscription
+
+    def taken(self, subscription: Subscription) -> Iterator[tuple[Any, dict[str, int]]]:
+        """Take and yield the received messages and their times, oldest first.
+
+        They are serialized if the subscription is raw.
+        """
+        take = (self.guards.get(subscription) or subscription.handle).take_message
+        kind, raw = subscription.msg_type, subscription.raw
+        while (found := take(kind, True)) is not None:
+            if not raw:
+                try:
+                    found = deserialized(found[0], kind), found[1]
+                except BadMessage as error:
+                    self.refuse(subscription, error)
+                    continue
+            yield found
+
+    def messages(self, subscription: Subscription) -> Iterator[Any]:
+        """Take and yield the received messages, oldest first."""
+        for message, _ in self.taken(subscription):
+            yield message
+
+    def decoded(self, subscription: Subscription, decode: Callable[[Any], T]) -> Iterator[T]:
+        """Yield `decode(message)` of each received message that it accepts."""
+        found: list[T] = []
+        for message in self.messages(subscription):
+            if self.accepts(subscription, lambda one: found.append(decode(one)), message):
+                yield found.pop()
+
+    def accepts(
+        self, subscription: Subscription, handle: Callable[..., object], *given: Any
+    ) -> bool:
+        """Call `handle(*given)` for a message; refuse it and return False if that raises."""
+        try:
+            handle(*given)
+        except Exception as error:
+            self.refuse(subscription, error)
+            return False
+        return True
+
+    def refuse(self, subscription: Subscription, error: Exception) -> None:
+        """Count a message that cannot be used; the next news name topic and sender."""
+        topic, guard = subscription.topic_name, self.guards.get(subscription)
+        if guard is None:
+            sender = rightful = self._publishers(topic)
+        else:
+            sender, rightful = guard.rightful, guard.publisher
+        expected = isinstance(error, BadMessage)
+        reason = str(error) if expected else f"{type(error).__name__}: {error}"
+        self.refusals.note(topic, sender, rightful, reason)
+        if not expected and self.due(f"{topic} {type(error).__name__}"):
+            traceback.print_exception(error)  # perhaps an error of the program
+        if self._tells and self.due(topic):
+            self._node.get_logger().warning(f"{topic}: message refused: {reason}")
+
+    def due(self, key: str) -> bool:
+        """Return whether a log line of this kind may be written now: one per LOG_PERIOD."""
+        now = time.monotonic()
+        if now - self._logged.get(key, -LOG_PERIOD) < LOG_PERIOD:
+            return False
+        self._logged[key] = now
+        return True
+
+    def news(self) -> list[str]:
+        """Return one line per topic with foreign publishers or refused messages since last time."""
+        now = [*complaints(self.guards.values()), *self.refusals.texts()]
+        before, self._before = self._before, now
+        return [text for text in now if text not in before]
+
+    def values(self) -> dict[str, object]:
+        """Return the diagnostic values."""
+        return {
+            "messages refused": self.refusals.count,
+            "unusable messages": "; ".join(self.refusals.texts()),
+            "foreign publishers": "; ".join(complaints(self.guards.values())),
+        }
+
+    def _publishers(self, topic: str) -> str:
+        """Return the nodes that publish a topic, looked up at most every NAMES_PERIOD."""
+        now = time.monotonic()
+        looked, names = self._names.get(topic, (-NAMES_PERIOD, ""))
+        if now - looked >= NAMES_PERIOD:
+            names = " or ".join(publishers(self._node, topic).values())
+            self._names[topic] = now, names
+        return names
