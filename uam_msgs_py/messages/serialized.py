@@ -135,8 +135,8 @@ def deserialized(data: bytes, kind: type) -> Any:
         raise BadMessage(f"{len(data)} bytes, at most {MOST_BYTES} allowed")
     try:
         return deserialize_message(data, kind)
-    except Exception as error:  # rclpy raises its own classes, without a common base
-        raise BadMessage(f"cannot be deserialized ({error})") from None
+    except Exception:  # rclpy raises its own classes, without a common base
+        raise BadMessage(f"cannot be deserialized: {len(data)} bytes, no {kind.__name__}") from None
 
 
 def check_names(given: Sequence[str], expected: Sequence[str]) -> None:

@@ -1,0 +1,83 @@
+"""JSON in messages: bounded in depth, length and numbers; other texts are refused."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_msgs_py.messages.fault_events import FaultEvent
+from uam_msgs_py.messages.json_text import DEEPEST, LONGEST, read_json
+from uam_msgs_py.messages.layouts import LONGEST_TEXT, BadMessage
+from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.parameter_comparison import ParameterComparison
+from uam_msgs_py.messages.serialized import MOST_BYTES, deserialized
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus, finite
+
+DEEP = "[" * 100_000
+HALF = '"\\ud800"'
+
+
+@pytest.mark.parametrize(
+    "text", ["", "abc", DEEP, DEEP + "]" * 100_000, HALF, f"{{{HALF}: 1}}", "9" * 30, "9" * 5000]
+)
+def test_what_is_no_value_for_python_and_ros_is_refused(text):
+    with pytest.raises(BadMessage):
+        read_json(text)
+
+
+def test_the_bounds_are_included():
+    assert read_json("[" * DEEPEST + "]" * DEEPEST) is not None
+    with pytest.raises(BadMessage, match="more than 8 levels"):
+        read_json("[" * (DEEPEST + 1) + "]" * (DEEPEST + 1))
+    assert read_json("[1]", 2) == [1]
+    with pytest.raises(BadMessage, match="more than 1 levels"):
+        read_json("[1]", 1)
+    assert read_json(str(2**63 - 1)) == 2**63 - 1
+    assert read_json('"' + "x" * (LONGEST - 2) + '"')
+    with pytest.raises(BadMessage, match="characters"):
+        read_json('"' + "x" * LONGEST + '"')
+
+
+@pytest.mark.parametrize("decode", [
+    FaultEvent.from_message, ParameterChange.from_message, ParameterComparison.from_message,
+    MissionStatus.from_message, AutopilotState.from_message,
+])  # fmt: skip
+@given(data=st.data())
+def test_any_texts_are_read_or_refused(decode, data):
+    texts = st.one_of(
+        st.sampled_from([DEEP, f"{DEEP} -> {DEEP}", " -> " * 9000, "1 -> 2", HALF, "1", "9" * 99]),
+        st.text(),
+    )
+    names = st.sampled_from(["by", "number", "place", "read", "required", "complete", "armed", "a"])
+    known = st.sampled_from(["mission", "autopilot", ParameterComparison.NAME, "x"])
+    status = DiagnosticStatus(
+        name=data.draw(known),
+        message=data.draw(st.sampled_from(["begun", "over", "accepted", "refused: no", "?"])),
+        values=[
+            KeyValue(key=k, value=v) for k, v in data.draw(st.dictionaries(names, texts)).items()
+        ],
+    )
+    message = DiagnosticArray(status=[status] * data.draw(st.integers(0, 2)))
+    try:
+        decode(message)
+    except BadMessage as error:
+        assert "\n" not in str(error) and len(str(error)) <= LONGEST_TEXT + 3
+
+
+def test_a_refusal_is_one_line_of_bounded_length():
+    assert str(BadMessage("a\n  b\tc")) == "a b c"
+    assert len(str(BadMessage("x" * 10_000))) == LONGEST_TEXT + 3
+
+
+def test_bytes_that_are_none_and_too_many_are_refused():
+    for data in (b"", b"\0", bytes.fromhex("00010000ffffffff")):
+        with pytest.raises(BadMessage, match="no DiagnosticArray"):
+            deserialized(data, DiagnosticArray)
+    with pytest.raises(BadMessage, match="1000001 bytes"):
+        deserialized(bytes(MOST_BYTES + 1), DiagnosticArray)
+
+
+@pytest.mark.parametrize("text", ["", None, "abc", "nan", "inf", "1e999"])
+def test_a_diagnostic_value_that_is_no_number_has_none(text):
+    assert finite(text) is None
+    assert finite("1.5") == 1.5
