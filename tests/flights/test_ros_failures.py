@@ -91,11 +91,29 @@ def test_a_node_that_hangs_is_named_and_killed(fly, long_scenario):
     nodes = flight.children()
     os.kill(nodes["arm_controller"], signal.SIGSTOP)
     assert flight.wait() == 1
-    assert "no arm command for t = " in flight.complained
-    assert "arm_controller is silent" in flight.complained
+    assert "arm_controller is stopped (SIGSTOP) and does not go on" in flight.complained
+    assert "the flight is waiting for arm command; arm_controller is silent" in flight.said
     assert "did not stop and were killed: arm_controller" in flight.said
     assert_nothing_left(flight, list(nodes.values()))
     kept(flight)
+
+
+@pytest.mark.long
+def test_a_node_that_stops_for_a_while_changes_nothing(fly, short_scenario, shared_flights):
+    """Longer than any wait of a node; no wall time is in a lockstep flight."""
+    flight = fly("--scenario", str(short_scenario), "--seed", "3")
+    flight.until_phase("take-off")
+    nodes = [psutil.Process(flight.children()[one]) for one in ("attitude_controller", "autopilot")]
+    for node in nodes:
+        node.suspend()
+        time.sleep(13.0)
+        node.resume()
+    assert flight.wait() == 0
+    assert "attitude_controller is stopped (SIGSTOP): the flight waits" in flight.said
+    series, single = (
+        timeseries.read(one.out / "timeseries.parquet") for one in (flight, shared_flights.single)
+    )
+    assert series.values.tobytes() == single.values.tobytes()
 
 
 def test_ctrl_c_keeps_what_was_flown(fly, long_scenario):

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import psutil
+
 from uam_lab.processes.child import fork
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
@@ -25,18 +27,22 @@ POLL = 0.02  # seconds
 class NodeFailed(RuntimeError):
     """A process of the flight ended by itself; the text contains its name and the reason."""
 
-    def __init__(self, name: str, status: int, log: Path):
+    def __init__(self, name: str, status: int | None, log: Path):
+        """status: None for a process that is stopped, see `Processes.stopped`."""
         self.name, self.status = name, status
         self.last_lines = tail(log)
         own_words = self.last_lines[-1] if self.last_lines else ""
         # prefix of a node's last line, or of a line that it logs by rclpy
         why = re.sub(rf"^({name}: |\[\w+\] \[[\d.]+\] \[{name}\]: )", "", own_words)
-        said = f": {why}" if status >= 0 and why != own_words else ""  # a killed one gave none
+        ended = status is not None and status >= 0
+        said = f": {why}" if ended and why != own_words else ""  # a killed one gave none
         super().__init__(f"{name} {describe(status)}{said}")
 
 
-def describe(status: int) -> str:
+def describe(status: int | None) -> str:
     """Return a return code of subprocess as text."""
+    if status is None:
+        return "is stopped (SIGSTOP) and does not go on"
     if status < 0:
         try:
             return f"was killed by {signal.Signals(-status).name}"
@@ -54,6 +60,13 @@ def tail(log: Path, count: int = LAST_LINES) -> list[str]:
     except OSError:
         return []
     return [line for line in text.splitlines() if line.strip()][-count:]
+
+
+def _is_stopped(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() in (psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP)
+    except psutil.Error:  # it ends at this moment
+        return False
 
 
 @dataclass
@@ -141,6 +154,14 @@ class Processes:
     def running(self, name: str) -> bool:
         """Return whether the child runs."""
         return self._children[name].status is None
+
+    def stopped(self) -> list[NodeFailed]:
+        """Return the running children that are stopped, by a signal or a debugger."""
+        return [
+            NodeFailed(child.name, None, child.log)
+            for child in self._children.values()
+            if child.status is None and not child.optional and _is_stopped(child.process.pid)
+        ]
 
     def check(self) -> None:
         """Raise NodeFailed for a child that ended unexpectedly.

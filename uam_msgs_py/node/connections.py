@@ -7,6 +7,7 @@ flight must wait for all connections before its first tick.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
@@ -73,6 +74,7 @@ class Connections:
     def __init__(self, node: Node, spun: bool = True):
         """spun: `node` is spun; else its owner passes the messages by `note`."""
         self._values: dict[str, dict[str, str]] = {}
+        self._reports: Counter[str] = Counter()
         self._namespace = node.get_namespace()
         if spun:
             topic = topics.DIAGNOSTICS
@@ -82,6 +84,11 @@ class Connections:
         """Take a message of /diagnostics."""
         for status in message.status:
             self._values[status.name] = {pair.key: pair.value for pair in status.values}
+            self._reports[status.name] += 1
+
+    def reports(self, node: str) -> int:
+        """Return the number of reports of a node so far."""
+        return self._reports[prefix(self._namespace) + node]
 
     def count(self, node: str, kind: str, topic: str) -> int:
         """Return the number of READERS or WRITERS (kind) of `topic` that `node` is connected to."""

@@ -6,7 +6,8 @@ the autopilot it is a simulator with MAVLink over TCP. Two clocks:
 lockstep  At every control tick the plant waits for the setpoint that the bridge sent for this
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
           It also waits for a recorder that is far behind, so that no message is lost.
-          Every wait has a limit in wall time; then the node reports which node did not answer.
+          It says whom it waits for. By hand a wait has a limit in wall time; in `uam fly` none:
+          it ends when no answer can come any more (`awaited.py`).
           With the autopilot's IMU (`publish_imu: false`) the autopilot gets its sample first, and
           passes it on. Ticks before the first setpoint run at the pace of the wall clock.
           While a lost node is restarted, ticks run at the pace of the wall clock without its
@@ -49,6 +50,7 @@ from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
+from uam_sim_bridge.nodes.awaited import REPORTS, Awaited
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.plant_health import PlantHealth
@@ -73,6 +75,8 @@ RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"
 CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
+LONGEST = math.inf  # [s] of a wait without a limit
+SILENT = 10.0  # [s] longest wait for the motor commands of an autopilot that may be silent
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = SECOND  # [ns] receive buffers have room for more, see config/dds/fastdds.xml
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
@@ -120,11 +124,9 @@ class Simulator:
         self.connections = Connections(node)
         self.recorded = RecorderProgress(node, declared.rightful)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._any_input_wakes)
-        patience = options.answer_timeout
+        patience = options.answer_timeout or LONGEST
         rotors = len(described.rotors)
-        waits = HilParameters(answer_timeout=patience)
-        if options.autopilot_always_answers:
-            waits = HilParameters(answer_timeout=patience, silent_timeout=patience)
+        waits = HilParameters(answer_timeout=min(patience, SILENT))
         address = options.hil_address
         self.hil = HilServer(options.hil_port, rotors, address, waits, options.seed)
         if not open_only_here(address):
@@ -141,9 +143,10 @@ class Simulator:
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._unanswered = 0  # ticks in a row without an answer
-        self._patience = Patience(options.answer_timeout)
+        self._patience = Patience(patience)
+        self._awaited = Awaited(self.connections, self._needed(), self._tell)
         self._published = 0  # wall time [ns] of its publication
-        self._restart = Restart(options.answer_timeout)
+        self._restart = Restart(patience)
         self._begun = 0.0  # wall time [s] at which this tick began
         latest = options.let_go or math.inf
         self._clock = PacedClock(self.plant.period, catch_up=CATCH_UP, latest=latest)
@@ -320,9 +323,29 @@ class Simulator:
         self.hil.prepare(taken, gyro, force, truth.state[0, POSITION], truth.quaternion)
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
 
+    def _needed(self) -> list[str]:
+        """Return the nodes that report and that a tick needs."""
+        own = dict.fromkeys(wire.publisher for wire in wiring.WIRES)
+        nodes = [one for one in own if one != wiring.PLANT and one not in self._own_names]
+        return [*nodes, wiring.RECORDER] if self.options.recorded else nodes
+
+    def _tell(self, whom: str) -> None:
+        self.health.waiting(whom, self.plant.time)
+
     def _receive_hil(self, timeout: float | None = None) -> None:
         """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""
-        self.hil.receive(timeout)
+        patience = timeout
+        if timeout is None and self.options.autopilot_always_answers:
+            patience = self.options.answer_timeout or math.inf
+        self._awaited.begin()
+
+        def going_on() -> bool:
+            self._awaited.told(lambda: "motor commands of the autopilot")
+            return not self._stop.raised
+
+        self.hil.receive(patience, going_on)
+        if self._stop.raised:
+            return
         if not self.hil.connected and not self.options.end_with_mission:
             self._await_autopilot()
             return
@@ -343,7 +366,7 @@ class Simulator:
             self.executor.spin_once(0.05)
 
     def _wait_for_answers(self) -> None:
-        if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout):
+        if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout or math.inf):
             raise PlantStopped(
                 f"nothing recorded since {self.recorded.until / SECOND:g} s; the recorder is silent"
             )
@@ -357,7 +380,8 @@ class Simulator:
                 return
         own_imu = self._stamp is not None
         if own_imu or not self._unanswered:
-            self._patience = Patience(self.options.answer_timeout)
+            self._patience = Patience(self.options.answer_timeout or math.inf)
+            self._awaited.begin()
         slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
         while missing := self.answers.missing(self._stamp):
             self._any_input_wakes = SETPOINT not in missing
@@ -367,7 +391,8 @@ class Simulator:
             self._restart.look(self.answers.restarts)
             if self._stop.raised or (self._restart.going_on and left <= 0.0):
                 break
-            over = self._patience.over
+            over = self._patience.over or self._awaited.lost
+            self._awaited.told(lambda: f"{' and '.join(sorted(missing))}{_suspected(missing)}")
             if not own_imu and left < -slack and not over:
                 break  # samples of the autopilot's IMU may be lost or refused
             if over:
@@ -388,22 +413,25 @@ class Simulator:
 
         patience: longest wait [s of wall time].
         """
-        waiting = Patience(patience)
+        waiting, until = Patience(patience), -1
         while self.options.recorded and not self._stop.raised:
             if self.node.stamp - self.recorded.until <= lag:
                 break
-            if waiting.over:
+            if self.recorded.until != until:
+                until = self.recorded.until
+                self._awaited.begin()
+            if waiting.over or self._awaited.lost:
                 return False
+            self._awaited.told(lambda: wiring.RECORDER)
             self._any_input_wakes = True
             self.executor.spin_once(0.1)
         return True
 
     def _no_answer(self, missing: frozenset[str]) -> str:
-        suspect = SUSPECTS.get(missing)
-        return (
-            f"no {' and no '.join(sorted(missing))} for t = {self.plant.time:.3f} s within "
-            f"{self.options.answer_timeout:g} s" + (f"; {suspect} is silent" if suspect else "")
-        )
+        limit = self.options.answer_timeout
+        since = f"within {limit:g} s" if limit else f"in {REPORTS} reports of every node"
+        what = f"no {' and no '.join(sorted(missing))} for t = {self.plant.time:.3f} s"
+        return f"{what} {since}{_suspected(missing)}"
 
     def _wait_until(self, deadline: float) -> None:
         left = deadline - time.monotonic()
@@ -442,6 +470,12 @@ def _warm_up(spare: Plant) -> None:
         spare.truth()
         rotors = len(spare.vehicle.description.rotors)
         spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
+
+
+def _suspected(missing: frozenset[str]) -> str:
+    """Return which node does not answer, for a text."""
+    suspect = SUSPECTS.get(missing)
+    return f"; {suspect} is silent" if suspect else ""
 
 
 def _listed(waiting: list[str]) -> str:

@@ -14,6 +14,9 @@ from uam_msgs_py.node.namespace import label
 from uam_sim_bridge.nodes.plant_options import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
+WAITING = "waiting for "  # begins the summary while time stands still
+TICKS = "ticks"  # so far
+
 
 class PlantHealth:
     """Reports the speed of the simulation, the duration of a tick, and the age of the answers.
@@ -33,10 +36,10 @@ class PlantHealth:
         self._missed = 0
         self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
 
-    def waiting(self, missing: str) -> None:
-        """Publish before the first tick; missing: the nodes and links that the plant waits for."""
+    def waiting(self, missing: str, simulated: float = 0.0) -> None:
+        """Publish while time stands still at `simulated` [s]; missing: what the plant waits for."""
         if self._due():
-            self._publish(0.0, STALE, f"waiting for {missing}")
+            self._publish(simulated, STALE, f"{WAITING}{missing}")
 
     def done_tick(self, begun: float, simulated: float) -> None:
         """Register a tick from time.perf_counter() `begun` [s] on, up to `simulated` time [s]."""
@@ -62,7 +65,7 @@ class PlantHealth:
             level, summary = ERROR, "; ".join(new)
             self._log.error(summary)
         values = {
-            "ticks": self._ticks,
+            TICKS: self._ticks,
             "real time factor": f"{(simulated - before) / (now - wall):.2f}",
             "ticks missed": self._statistics.missed_ticks,
             "late motor commands": self._statistics.late_motor_commands,

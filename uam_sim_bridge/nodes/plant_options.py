@@ -77,7 +77,12 @@ class PlantParameters(SimulatedParameters):
         0.0, "longest wait for the other nodes without progress, 0 = for ever", "s", 0.0, 86400.0
     )
     answer_timeout: float = number(
-        10.0, "longest wait for the answers to a tick, of wall time", "s", 0.01, 3600.0
+        10.0,
+        "longest wait for the answers to a tick, of wall time; 0: until every node has reported in "
+        "/diagnostics ten times since",
+        "s",
+        0.0,
+        3600.0,
     )
     time_limit: float = number(
         0.0, "simulation time at which the flight ends in any case, 0 = never", "s", 0.0, 1e6

@@ -19,6 +19,7 @@ from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.placement import placing
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
 from uam_lab.flight.ros.status_listener import StatusListener
+from uam_lab.flight.ros.waits import Waits
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
@@ -29,6 +30,8 @@ from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.plant_options import NOT_READY
 from uam_sim_bridge.ports import Ports, Reservation
+
+LOCKSTEP = "lockstep"
 
 
 def fly(
@@ -146,7 +149,10 @@ def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -
 
 
 class SimulatedCourse:
-    """A flight in simulation: it goes on until the plant ends; faults of processes are injected."""
+    """A flight in simulation: it goes on until the plant ends; faults of processes are injected.
+
+    In lockstep a process that stays stopped ends it, see `Waits`.
+    """
 
     def __init__(
         self,
@@ -158,13 +164,19 @@ class SimulatedCourse:
     ) -> None:
         self._children, self._listener, self._stop = children, listener, stop
         self._faults = _process_faults(settings, children, listener, observer)
+        self._waits = Waits(children, listener, observer) if settings.clock == LOCKSTEP else None
 
     def goes_on(self) -> bool:
-        """Begin and end the due faults; return whether the plant runs and nobody stops it."""
+        """Begin and end the due faults; return whether the plant runs and nobody stops it.
+
+        Raises NodeFailed.
+        """
         injected, mission_time = self._stop.injected, self._listener.mission_time
         while not injected.empty():
             self._faults.add(injected.get(), mission_time or 0.0)
         self._faults.update(mission_time, self._listener.phase)
+        if self._waits is not None:
+            self._waits.look()
         return self._children.running(wiring.PLANT) and not self._stop.raised
 
     def __enter__(self) -> SimulatedCourse:
@@ -192,4 +204,4 @@ def _process_faults(
             topics.append(FaultTopic(listener.node))
         topics[0].publish(listener.stamp, [one])
 
-    return ProcessFaults(children, schedule, announce)
+    return ProcessFaults(children, schedule, announce, lockstep=settings.clock == LOCKSTEP)

@@ -60,9 +60,14 @@ class ProcessFaults:
         schedule: Schedule,
         announce: Callable[[FaultState], None],
         clock: Callable[[], float] = time.monotonic,
+        lockstep: bool = False,
     ):
-        """schedule: process faults; announce: called when a fault begins or ends; clock: [s]."""
+        """schedule: process faults; announce: called when a fault begins or ends; clock: [s].
+
+        lockstep: the end of a process ends the flight.
+        """
         self._children, self._announce, self._clock = children, announce, clock
+        self._lockstep = lockstep
         self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._phases = PhaseTimes()
         self._ends: dict[int, float] = {}  # by the clock
@@ -100,7 +105,8 @@ class ProcessFaults:
             return
         pid = program_of(process, self._children.pid(process))
         if isinstance(fault, NodeKill):
-            self._children.let_end(process)
+            if not self._lockstep:  # there the plant would wait for it without end
+                self._children.let_end(process)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
             return

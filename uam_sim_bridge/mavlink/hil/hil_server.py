@@ -10,6 +10,7 @@ from __future__ import annotations
 import ipaddress
 import select
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,11 +114,14 @@ class HilServer(HilMessages):
         except OSError:
             self._stop()
 
-    def receive(self, timeout: float | None = None) -> np.ndarray:
+    def receive(
+        self, timeout: float | None = None, going_on: Callable[[], bool] = lambda: True
+    ) -> np.ndarray:
         """Wait for the answer to the last `send`; return `motors` (n,), also without an answer.
 
         Without a connection, or if the autopilot closes it, the motors are zero. timeout: wall time
-        [s]; None for `answer_timeout` or `silent_timeout` (module docstring).
+        [s]; None for `answer_timeout` or `silent_timeout` (module docstring). going_on: called
+        while it waits; False ends the wait.
         """
         if self._link is None:
             return self.motors
@@ -126,7 +130,7 @@ class HilServer(HilMessages):
             timeout = p.answer_timeout if self.answered else p.silent_timeout
         self.answered = False
         patience = Patience(timeout)
-        while not self.answered:
+        while not self.answered and going_on():
             left = patience.left
             if select.select([self._link], [], [], min(left, SLICE / 2))[0]:
                 if not self._receive():
