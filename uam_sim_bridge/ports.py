@@ -8,6 +8,7 @@ import errno
 import fcntl
 import os
 import socket
+import stat
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -120,7 +121,7 @@ def instances_in_use(folder: Path | None = None) -> list[int]:
 def held(lock: Path) -> bool:
     """Return whether a process holds the lock; False for a missing or unlocked file."""
     try:
-        opened = os.open(lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+        opened = os.open(lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
         return False
     try:
@@ -164,7 +165,11 @@ class Reservation:
         why = ""
         for number in candidates:
             ports = ports_of(number)
-            self._lock = self._take(self._path(number))
+            try:
+                self._lock = self._take(self._path(number))
+            except OSError as error:
+                why = f"{self._path(number)} is no lock: {error.strerror}; remove it"
+                continue
             if self._lock is None:
                 why = "reserved by another flight"
                 continue
@@ -200,8 +205,15 @@ class Reservation:
 
     @staticmethod
     def _take(path: Path) -> int | None:
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        """Return the descriptor of the lock, None if another flight has it.
+
+        Raises OSError for something else in its place: a folder, a link, a file of another user.
+        """
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         lock = os.open(path, flags, 0o600)
+        if not stat.S_ISREG(os.fstat(lock).st_mode):
+            os.close(lock)
+            raise OSError(errno.EINVAL, "no regular file")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # the last holder may have removed the file between open and flock

@@ -164,7 +164,7 @@ class MemoryUdpPort(UdpPort):
     def __init__(self, codec: Codec) -> None:
         self._socket = self.memory = FakeUdp()
         self._codec, self._framer = codec, Framer(codec)
-        self._peer, self._locked = ("127.0.0.1", 14540), False
+        self._peer, self._silence = ("127.0.0.1", 14540), None
 
 
 class FakeSimulator:

@@ -1,11 +1,17 @@
 """uam doctor: cores, memory, timer, rendering."""
 
+from collections import namedtuple
+
 import numpy as np
 import pytest
 
+from uam_control.settings.configuration import ConfigurationError
 from uam_lab.doctor import machine, rendering
 from uam_lab.doctor.check_process import TOO_LATE, Said
 from uam_lab.doctor.finding import Verdict
+from uam_lab.flight.observer import Observer
+from uam_lab.flight.ros import supervise
+from uam_lab.processes import shared_memory
 
 OK, WARN, FAIL = Verdict
 
@@ -51,3 +57,22 @@ def test_without_opengl_flights_still_work(monkeypatch):
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     (found,) = rendering.checks()
     assert found.verdict is WARN
+
+
+def test_a_full_shared_memory_is_found_before_a_flight(tmp_path, monkeypatch):
+    usage = namedtuple("usage", "free")
+    monkeypatch.setattr(shared_memory.psutil, "disk_usage", lambda place: usage(8e6))
+    assert shared_memory.shortage(tmp_path) == ""
+    assert machine.shared("").verdict is OK
+    monkeypatch.setattr(shared_memory.psutil, "disk_usage", lambda place: usage(7.9e6))
+    text = shared_memory.shortage(tmp_path)
+    assert text.startswith(f"{tmp_path} has 7.9 MB left, 8 MB are needed: nodes would end")
+    found = machine.shared(text)
+    assert found.verdict is FAIL and found.advice.startswith("remove what")
+    monkeypatch.setattr(supervise, "shortage", lambda: text)
+    with pytest.raises(ConfigurationError, match="SIGBUS"):
+        supervise.prepare([], Observer())
+
+
+def test_without_a_place_for_shared_memory_nothing_lacks(tmp_path):
+    assert shared_memory.shortage(tmp_path / "absent") == ""

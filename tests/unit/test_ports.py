@@ -1,5 +1,6 @@
 """Instances: two flights never share one, and a killed flight leaves its instance free."""
 
+import os
 import socket
 import subprocess
 import sys
@@ -103,3 +104,25 @@ def test_a_ros_program_in_the_domain_does_not_move_a_flight(tmp_path):
         daemon.bind(("127.0.0.1", ports.discovery_port(ports.ports_of(instance).domain)))
         with Reservation(instance, folder=tmp_path) as flight:
             assert flight.ports == ports.ports_of(instance)
+
+
+def folder(path):
+    path.mkdir()
+
+
+def link(path):
+    path.symlink_to("elsewhere")
+
+
+@pytest.mark.parametrize("make", [folder, link, os.mkfifo])
+def test_what_is_no_lock_blocks_its_instance_alone(tmp_path, make):
+    with Reservation(folder=tmp_path) as first:
+        instance = first.ports.instance
+    wrong = ports.lock_file(tmp_path, instance)
+    make(wrong)
+    with Reservation(folder=tmp_path) as other:
+        assert other.ports.instance != instance
+    with pytest.raises(PortError, match=rf"instance {instance} is not free: {wrong} is no lock: "):
+        Reservation(instance, folder=tmp_path)
+    assert wrong.is_symlink() or wrong.exists(), "nothing of the user is removed"
+    assert ports.flights(tmp_path) == []

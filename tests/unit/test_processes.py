@@ -171,12 +171,29 @@ def test_the_end_of_an_optional_child_is_reported_once_and_no_failure(children):
     assert children.missed() == [], "reported once; a stopped child is not missed"
 
 
+def test_a_stopped_child_is_named_while_it_is_stopped(children):
+    made = children.start("a", "sleeper")
+    children.start("b", "sleeper", optional=True)
+    assert children.stopped() == []
+    for name in ("a", "b"):
+        os.kill(children.pid(name), signal.SIGSTOP)
+    wait_for(children.stopped)
+    (found,) = children.stopped()
+    assert (found.name, found.status) == ("a", None)
+    assert str(found) == "a is stopped (SIGSTOP) and does not go on"
+    for name in ("a", "b"):
+        os.kill(children.pid(name), signal.SIGCONT)
+    wait_for(lambda: not children.stopped())
+    assert made.status is None
+
+
 def test_a_terminal_interrupt_does_not_reach_the_children(children):
     children.start("a", "sleeper")
     assert os.getpgid(children.pid("a")) != os.getpgid(0)
 
 
-def test_no_child_survives_a_killed_orchestrator(tmp_path):
+@pytest.mark.parametrize("stopped", [False, True])
+def test_no_child_survives_a_killed_orchestrator(tmp_path, stopped):
     (tmp_path / "sleeper.py").write_text(SLEEPER)
     path = os.pathsep.join([str(tmp_path), *sys.path])
     program = f"""
@@ -195,6 +212,8 @@ time.sleep(60)
     pids = [int(word) for word in orchestrator.stdout.readline().split()]
     for name in ("a", "b"):
         wait_for(lambda name=name: "ready" in processes.tail(tmp_path / f"{name}.log"))
+    if stopped:
+        os.kill(pids[0], signal.SIGSTOP)
     orchestrator.kill()
     orchestrator.wait()
     orchestrator.stdout.close()

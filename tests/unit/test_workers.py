@@ -14,6 +14,7 @@ import pytest
 import tiny_work
 from distributed import LocalCluster
 
+from uam_lab.workers import local_cluster
 from uam_lab.workers import workers as module
 from uam_lab.workers.identity import difference, identity
 from uam_lab.workers.place import WorkersError, Workplace
@@ -131,3 +132,24 @@ def test_no_worker_outlives_its_command(number):
         while any(map(psutil.Process.is_running, children)) and time.monotonic() < end:
             time.sleep(0.05)
         assert not [one for one in children if one.is_running()]
+
+
+def test_a_cluster_that_closes_late_costs_no_result(monkeypatch):
+    closed = []
+
+    class Late:
+        workers = {}
+
+        def __init__(self, **options):
+            """Take what a LocalCluster takes."""
+
+        def close(self, timeout):
+            closed.append(timeout)
+            raise TimeoutError("not within 5 s")
+
+    monkeypatch.setattr(local_cluster, "LocalCluster", Late)
+    with local_cluster.local_cluster(2):
+        """The results are there."""
+    assert closed == [local_cluster.CLOSING]
+    with pytest.raises(ValueError, match="in the block"), local_cluster.local_cluster(2):
+        raise ValueError("in the block")

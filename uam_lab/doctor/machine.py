@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import psutil
 
-from uam_lab.doctor.finding import Finding, ok, warn
+from uam_lab.doctor.finding import Finding, fail, ok, warn
+from uam_lab.processes.shared_memory import shortage
 
 TICK = 0.004  # [s] control period
 SLEEPS = 250
@@ -21,6 +22,7 @@ def checks() -> Iterator[Finding]:
     """Yield the findings about the machine."""
     yield cores(len(os.sched_getaffinity(0)), os.getloadavg()[0])
     yield memory(psutil.virtual_memory().available / 2**30)
+    yield shared(shortage())
     yield timer(oversleep())
 
 
@@ -48,6 +50,14 @@ def memory(free: float) -> Finding:
             f"a flight with its report needs {MEMORY:g} GiB: --no-video, or end other programs",
         )
     return ok("memory", found)
+
+
+def shared(shortage: str) -> Finding:
+    """Check the room for shared memory; shortage: see `shared_memory.shortage`."""
+    if shortage:
+        found, _, advice = shortage.partition("; ")
+        return fail("shared memory", found, advice)
+    return ok("shared memory", "room in /dev/shm")
 
 
 def oversleep(count: int = SLEEPS, tick: float = TICK) -> np.ndarray:

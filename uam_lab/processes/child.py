@@ -5,14 +5,15 @@ from one process that has imported the modules (multiprocessing's fork server, s
 shortens the start of a flight and the restart of a lost node.
 
 Each child monitors its orchestrator. When the orchestrator has ended, also by `kill -9`, the child
-sends itself SIGINT, and SIGKILL after GRACE. Unlike PR_SET_PDEATHSIG this works on every system and
-lets the recorder close its file.
+sends itself SIGINT, and SIGKILL after GRACE. Unlike PR_SET_PDEATHSIG with SIGKILL this works on
+every system and lets the recorder close its file.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import importlib
 import multiprocessing
 import multiprocessing.connection
@@ -37,6 +38,7 @@ from uam_lab.processes.borrowed_environment import borrowed
 GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
 TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
 POLL = 0.002  # seconds
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
 # One thread per node: the matrices are small, and thread pools on few cores delay each other. The
 # libraries read these variables when they are loaded, so the forking process needs them.
 SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -64,12 +66,12 @@ def prepare(modules: Iterable[str]) -> None:
     """Start the forking process, which imports `modules`; return at once.
 
     Without this call the first child starts that process, and each child does its own imports.
-    Ctrl-C in the terminal does not interrupt its imports.
+    Ctrl-C in the terminal does not interrupt its imports; a closed terminal does not end it.
     """
     with borrowed(SINGLE_THREAD):
         _context.set_forkserver_preload([__name__, *modules])
         multiprocessing.resource_tracker.ensure_running()  # its start unblocks the signal
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
         try:
             multiprocessing.forkserver.ensure_running()
         finally:
@@ -133,6 +135,7 @@ def _run(
     os.environ.update(environment)
     added = environment.get("PYTHONPATH", "").split(os.pathsep)
     sys.path[:0] = [place for place in added if place and place not in sys.path]
+    _continue_without_the_orchestrator()
     threading.Thread(target=_follow_the_orchestrator, daemon=True).start()
     sys.argv = [module, *arguments]
     try:
@@ -141,6 +144,19 @@ def _run(
         traceback.print_exc()
         status = 1
     sys.exit(status)
+
+
+def _continue_without_the_orchestrator() -> None:
+    """Have Linux send SIGCONT at the end of the forking process, which ends with the orchestrator.
+
+    A process that is stopped could not follow it, and would keep its ports.
+    """
+    server = multiprocessing.forkserver._forkserver
+    if server._forkserver_alive_fd is not None:  # while a child has it, that process does not end
+        os.close(server._forkserver_alive_fd)
+        server._forkserver_alive_fd = None
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGCONT, 0, 0, 0)
 
 
 def _follow_the_orchestrator() -> None:

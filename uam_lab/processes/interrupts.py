@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import signal
 from typing import Any
 
 INTERRUPTED = 128 + signal.SIGINT  # exit status
+OUTPUTS = (1, 2)  # file descriptors of standard output and error
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -36,15 +38,32 @@ class StopRequest:
 
 
 class Interrupts(StopRequest):
-    """Context manager that counts SIGINT, SIGTERM and SIGHUP instead of their normal effect."""
+    """Context manager that counts SIGINT, SIGTERM and SIGHUP instead of their normal effect.
+
+    A SIGHUP that is ignored stays ignored: `nohup` starts a program so. A closed terminal ends the
+    flight in order; what would be written to it is lost.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self._before: dict[int, object] = {}
+        self._terminals: list[int] = []  # file descriptors
 
     def __enter__(self) -> Interrupts:
-        self._before = {number: signal.signal(number, self.repeat) for number in SIGNALS}
+        self._terminals = [output for output in OUTPUTS if os.isatty(output)]
+        handlers = dict.fromkeys(SIGNALS, self.repeat) | {signal.SIGHUP: self._hung_up}
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+            del handlers[signal.SIGHUP]
+        self._before = {number: signal.signal(number, to) for number, to in handlers.items()}
         return self
+
+    def _hung_up(self, *_) -> None:
+        """Count the request; writing to a closed terminal would raise."""
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for output in self._terminals:
+            os.dup2(nowhere, output)
+        os.close(nowhere)
+        self.repeat()
 
     def __exit__(self, *exception) -> None:
         for number, handler in self._before.items():

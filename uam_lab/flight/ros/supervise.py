@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import FORKER, node_arguments
@@ -17,6 +18,7 @@ from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment, export_line
 from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
+from uam_lab.processes.shared_memory import shortage
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
@@ -36,7 +38,9 @@ class Course(Protocol):
 
 def prepare(modules: Iterable[str], observer: Observer) -> None:
     """Begin to import the modules of the processes, unless `uam` has begun to; wait for the end of
-    a killed flight's nodes."""
+    a killed flight's nodes. Raises ConfigurationError without room for shared memory."""
+    if lack := shortage():
+        raise ConfigurationError(lack)
     child.prepare([*modules, FORKER])
     await_orphans(observer.message)
 

@@ -6,13 +6,18 @@ import socket
 import time as clock
 
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message
+from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.ports import PortError
 
 HOST = "127.0.0.1"
+SILENT = 5.0  # [s]; does not count while the simulation stands still
 
 
 class UdpPort:
-    """UDP to the companion computer; like PX4, answers only the first peer with a valid message."""
+    """UDP to the companion computer; like PX4, answers only the first peer with a valid message.
+
+    After SILENT without a message of this peer the next one with a valid message takes its place.
+    """
 
     def __init__(self, local: int, remote: int, codec: Codec) -> None:
         """local: port to listen on; remote: destination until the first peer sends a message.
@@ -32,11 +37,12 @@ class UdpPort:
         self._codec = codec
         self._framer = Framer(codec)
         self._peer = (HOST, remote)
-        self._locked = False
+        self._silence: Patience | None = None  # of the peer; None: before the first message
 
     def receive(self) -> list[Message]:
         """Return all received messages."""
         messages: list[Message] = []
+        silent = self._silence is None or self._silence.over
         while True:
             try:
                 data, sender = self._socket.recvfrom(65535)
@@ -44,11 +50,11 @@ class UdpPort:
                 return messages
             except ConnectionError:  # the peer's port was closed at the last send
                 continue
-            if self._locked and sender != self._peer:
+            if not silent and sender != self._peer:
                 continue
             new = self._framer.datagram(data)
             if new:
-                self._peer, self._locked = sender, True
+                self._peer, self._silence, silent = sender, Patience(SILENT), False
             messages += new
 
     def send(self, messages: list[Message]) -> None:
