@@ -24,20 +24,24 @@ LOW_BATTERY = {
     "SIM_BAT_MIN_PCT": 30.0,
     "SIM_BAT_DRAIN": 3.0,
 }  # PX4 lands long before the supervisor's own limit of 15 %
+KILL_SWITCH = [
+    *("COM_RC_IN_MODE=0", "RC_MAP_KILL_SW=7", "RC_CHAN_CNT=8"),
+    *("RC_MAP_ROLL=1", "RC_MAP_PITCH=2", "RC_MAP_THROTTLE=3", "RC_MAP_YAW=4"),
+]  # a radio whose channels come over MAVLink
 
 
 class Pilot:
-    """Sends sticks in their middle; from `act` on chooses a mode, or drains the battery.
+    """Sends sticks in their middle; from `act` on chooses a mode, drains the battery, or kills.
 
     `modes`: (time since arming [s], mode) of every change, as PX4 reports them to a ground station:
     once a second; `acted` [s] or None.
     """
 
-    def __init__(self, system: int, mode: Mode | None) -> None:
-        """system: of PX4; mode: None for the battery."""
+    def __init__(self, system: int, mode: Mode | None = None, kill: float | None = None) -> None:
+        """system: of PX4; mode: None for the battery; kill [s]: how long the kill switch is on."""
         self.modes: list[tuple[float, Mode]] = []
         self.acted: float | None = None
-        self._system, self._at, self._mode = system, math.inf, mode
+        self._system, self._at, self._mode, self._kill = system, math.inf, mode, kill
         self._codec = Codec(255, mavlink2.MAV_COMP_ID_MISSIONPLANNER)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", PORT))
@@ -84,12 +88,21 @@ class Pilot:
             if self._peer is not None and time.monotonic() - beat > BEAT:
                 beat, beats = time.monotonic(), beats + 1
                 if beats < 40:
-                    self._set("COM_RC_IN_MODE", 1)
+                    self._set("COM_RC_IN_MODE", int(self._kill is None))
                     self._send(
                         mavlink2.MAVLink_set_gps_global_origin_message(self._system, *ORIGIN)
                     )
-                self._send(mavlink2.MAVLink_manual_control_message(self._system, 0, 0, 500, 0, 0))
+                self._sticks()
                 self._act()
+
+    def _sticks(self) -> None:
+        """Send the sticks: as a joystick, or the channels of a radio with a kill switch."""
+        if self._kill is None:
+            self._send(mavlink2.MAVLink_manual_control_message(self._system, 0, 0, 500, 0, 0))
+            return
+        engaged = self.acted is not None and self.since < self.acted + self._kill
+        channels = [1500, 1500, 1500, 1500, 1500, 1500, 2000 if engaged else 1000, 1000]
+        self._send(mavlink2.MAVLink_rc_channels_override_message(self._system, 1, *channels))
 
     def _take(self, message) -> None:
         kind = message.get_type()
@@ -116,6 +129,8 @@ class Pilot:
         if not offboard or taken or self.since < due or self.since > self._at + 5 * AGAIN:
             return
         self.acted = self.since if self.acted is None else self.acted
+        if self._kill is not None:
+            return
         if self._mode is None:
             for name, value in LOW_BATTERY.items():
                 self._set(name, value)

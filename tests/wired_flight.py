@@ -29,6 +29,7 @@ from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
 
 GROUND_STATION = 255, 190  # system and component
+KILL_CHANNEL = 7
 REQUESTS = "SET_MODE", "COMMAND_LONG", "COMMAND_INT"
 HARMLESS = (
     MavCmd.SET_MESSAGE_INTERVAL,
@@ -67,6 +68,12 @@ class GroundStation:
 
     def stop_motors(self) -> None:
         self.command(MavCmd.ARM_DISARM, 0.0, FORCE)
+
+    def kill_switch(self, engaged: bool) -> None:
+        """Send the radio's channels; its kill switch is on KILL_CHANNEL."""
+        channels = [1500] * 8
+        channels[KILL_CHANNEL - 1] = 2000 if engaged else 1000
+        self.send(mavlink2.MAVLink_rc_channels_override_message(1, 1, *channels))
 
     def sticks(self, forward: float = 0.0) -> None:
         self.send(mavlink2.MAVLink_manual_control_message(1, round(1000 * forward), 0, 500, 0, 0))

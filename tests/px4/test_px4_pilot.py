@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 from px4_at_hand import NO_PX4, installation
-from px4_pilot import Pilot
+from px4_pilot import KILL_SWITCH, Pilot
 
+from uam_control.coordinates import Z
 from uam_lab import CommandRefused, Flight
+from uam_lab.results import timeseries
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 # the extra px4: it reads PX4's log, the record of what PX4 received
 pytest.importorskip("pyulog")
 from px4_take_over import read
+from pyulog import ULog
 
 TAKE_OFF, APPROACH, PICK, CARRY, LANDING = "take-off", "approach", "pick", "carry", "land"
 PHASES = TAKE_OFF, APPROACH, PICK, CARRY, LANDING
@@ -83,3 +86,34 @@ def test_a_landing_by_pilot_or_battery_is_not_overridden(tmp_path, mode, phase):
     assert not result.completed and "has control" in result.reason
     if phase != PICK:  # there it lands on the payload's stand: docs/supervision.md
         assert found.tilt < UPRIGHT
+
+
+@pytest.mark.parametrize("phase", [TAKE_OFF, APPROACH, CARRY])
+@pytest.mark.parametrize("seconds", [0.3, 1.0, 6.0])
+def test_the_kill_switch_is_final(tmp_path, seconds, phase):
+    """Engaged for a while in the air: the vehicle falls, and no motor turns again."""
+    pilot = Pilot(INSTANCE + 1, kill=seconds)
+    options = {"scenario": "quick_pick", "autopilot": "px4", "instance": INSTANCE}
+    try:
+        with Flight(**options, px4_params=KILL_SWITCH, out=tmp_path / "flight") as flight:
+            begun = flight.wait_for(phase, PATIENCE).time
+            flight.wait_for(lambda status: status.time >= max(begun, 0.0) + 1.0, PATIENCE)
+            pilot.act()
+            result = flight.wait(PATIENCE)
+    finally:
+        pilot.close()
+    assert not result.completed
+    assert "the pilot's kill switch has stopped the motors" in result.reason
+    last = result.metrics["transitions"][-1]
+    assert last["to"] == "disarmed"
+    series = timeseries.read(result.folder / "timeseries.parquet")
+    after = series.time > last["time_s"] + 0.2
+    heights = series.block("truth.")[after, Z]
+    assert np.all(heights <= heights[0] + 0.02) and heights[-1] < 0.5
+    log = ULog(str(result.folder / "px4.ulg"), ["actuator_armed", "actuator_motors"])
+    armed, motors = (log.get_dataset(name).data for name in ("actuator_armed", "actuator_motors"))
+    name = "kill" if "kill" in armed else "manual_lockdown"
+    killed = armed["timestamp"][armed[name] != 0][0]
+    assert armed["armed"][-1] == 0
+    off = motors["timestamp"] > killed + 0.5e6
+    assert np.nan_to_num(motors["control[0]"][off]).max(initial=0.0) < 0.01

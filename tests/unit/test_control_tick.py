@@ -29,6 +29,7 @@ class Port:
     def __init__(self, sequence):
         self.sequence = sequence
         self.armed, self.mode, self.landed, self.armed_since = False, Mode.HOLD, True, None
+        self.killed, self.loss_time = False, 1.0
         self.round_trip = 0.01
         self.poses, self.setpoints = [], []
 

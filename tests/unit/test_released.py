@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
+    NEW_REPORTS,
     OffboardParameters,
     OffboardSequence,
     Phase,
@@ -20,7 +21,7 @@ PERIOD = 0.004
 OFFBOARD = Reported(True, True, Mode.OFFBOARD, Mode.OFFBOARD)
 CHOSEN = Reported(True, True, Mode.HOLD, Mode.HOLD)  # by a person
 FAILSAFE = Reported(True, True, Mode.LAND, Mode.OFFBOARD, failsafe=True)
-OTHERS = [mode for mode in Mode if mode not in (Mode.OFFBOARD, Mode.UNKNOWN)]
+OTHERS = sorted(set(Mode) - {Mode.OFFBOARD, Mode.UNKNOWN, Mode.TERMINATION}, key=str)
 RETURNING = OffboardParameters(return_after_lost_link=True)
 
 
@@ -295,6 +296,115 @@ def test_after_a_release_that_ended_with_disarming_the_next_flight_can_start():
     assert asked and set(asked) == {Request.OFFBOARD}
 
 
+KILLED = OFFBOARD._replace(killed=True)
+TERMINATED = Reported(True, True, Mode.TERMINATION, Mode.TERMINATION, killed=True)
+
+
+@pytest.mark.parametrize("how", ["text", "heartbeat", "termination"])
+@pytest.mark.parametrize("before", [OFFBOARD, CHOSEN])
+def test_a_kill_by_the_autopilot_is_final(how, before):
+    """Disarming is requested, after 5 s by force, until it has happened; nothing is armed then."""
+    flight = Ticks()
+    flight.run(1.0, before)
+    if how == "text":
+        flight.sequence.text(6, "Kill engaged\t")  # PX4: of severity INFO on the ground
+    else:
+        flight.run(PERIOD, KILLED if how == "heartbeat" else TERMINATED)
+    assert flight.sequence.stopped and flight.sequence.phase is Phase.FAILED
+    expected = "flight termination" if how == "termination" else "the pilot's kill switch"
+    assert flight.sequence.failure == f"{expected} has stopped the motors"
+    flight.requests.clear()
+    again = TERMINATED if how == "termination" else OFFBOARD  # the switch is off again
+    requests = flight.run(4.4, again)
+    assert len(requests) >= 8 and set(requests) == {Request.DISARM}
+    assert COMMANDS[Request.DISARM][1] == (0.0, 0.0)
+    flight.sequence.set_desired(False)
+    flight.run(1.0, again)
+    assert flight.run(1.0, again) == [Request.KILL] * 2  # lies where PX4 does not see it landed
+    assert flight.sequence.stopped
+    assert flight.run(5.0, again._replace(armed=False)) == [] and flight.sequence.stopped
+    assert flight.sequence.phase is Phase.DISARMED
+    flight.sequence.set_desired(True)
+    assert not flight.sequence.stopped and not flight.sequence.failure
+
+
+def test_a_kill_switch_that_is_tried_before_a_flight_ends_nothing():
+    sequence = OffboardSequence()
+    for tick in range(500):
+        sequence.update(PERIOD * tick, Reported(True, False, Mode.HOLD, killed=tick > 100))
+        sequence.text(6, "Kill engaged")
+    assert not sequence.stopped and sequence.phase is Phase.STREAMING
+
+
+def test_a_pilot_who_flies_on_after_a_kill_is_left_alone():
+    flight = Ticks()
+    flight.run(0.1, KILLED)
+    flight.requests.clear()
+    assert flight.run(10.0, CHOSEN) == [] and flight.sequence.phase is Phase.RELEASED
+    flight.sequence.set_desired(False)
+    assert flight.run(10.0, CHOSEN) == [] and flight.sequence.stopped
+
+
+def test_a_failed_sequence_is_released_to_who_takes_over_and_disarmed_after_the_landing():
+    flight = Ticks()
+    flight.sequence.rebooted(flight.time)
+    assert flight.sequence.failure == "the autopilot rebooted in flight"
+    assert flight.run(1.0, OFFBOARD) == [] and flight.sequence.phase is Phase.FAILED
+    landing = Reported(True, True, Mode.LAND, Mode.LAND)
+    flight.run(PERIOD, landing)
+    assert flight.sequence.phase is Phase.RELEASED and not flight.sequence.failure
+    flight = Ticks()
+    flight.sequence.rebooted(flight.time)
+    flight.sequence.set_desired(False)
+    assert set(flight.run(1.0, OFFBOARD)) == {Request.DISARM}
+
+
+def test_a_landing_by_a_person_stays_one_when_px4_goes_back_to_offboard_to_disarm():
+    flight = Ticks()
+    landing = Reported(True, True, Mode.LAND, Mode.LAND)
+    flight.run(1.0, landing)
+    flight.run(0.5, landing._replace(intended=Mode.OFFBOARD))
+    assert flight.sequence.released_to == "the pilot or a ground station, in LAND"
+    flight.run(PERIOD, landing._replace(armed=False, intended=Mode.OFFBOARD))
+    assert flight.sequence.failure.endswith("the pilot or a ground station, in LAND")
+
+
+@pytest.mark.parametrize("frozen", [0.0, 5.0])
+def test_after_a_frozen_bridge_the_vehicle_is_the_autopilots_until_its_reports_are_new(frozen):
+    """frozen: told by the other clock alone, as where old ticks are worked off first."""
+    flight, sequence = Ticks(), None
+    sequence = flight.sequence
+    sequence.begin(flight.time, 1.0)
+    assert not sequence.released
+    flight.tick += 0 if frozen else 1250
+    sequence.begin(flight.time, 1.0, frozen)
+    assert sequence.released and sequence.withheld and sequence.after_loss
+    assert sequence.released_to == "the autopilot's failsafe after a lost stream of setpoints"
+    ended = flight.time + NEW_REPORTS
+    while flight.time < ended - PERIOD:
+        sequence.begin(flight.time, 1.0)
+        assert sequence.withheld
+        flight.run(PERIOD, OFFBOARD, streams=False)  # an old report
+        assert sequence.released
+    for _ in range(3):
+        sequence.begin(flight.time, 1.0)
+        flight.run(PERIOD, FAILSAFE)
+    assert not sequence.withheld and sequence.after_loss
+    flight.run(PERIOD, OFFBOARD)
+    assert sequence.phase is Phase.FLYING and not sequence.after_loss
+
+
+def test_a_gap_within_the_loss_time_or_on_purpose_is_none():
+    flight = Ticks()
+    flight.tick += 240
+    flight.sequence.begin(flight.time, 1.0)
+    assert flight.sequence.phase is Phase.FLYING
+    flight.sequence.let_go = True
+    flight.tick += 1000
+    flight.sequence.begin(flight.time, 1.0)
+    assert flight.sequence.phase is Phase.FLYING
+
+
 REPORTS = st.builds(
     Reported,
     connected=st.sampled_from([True, True, True, False]),
@@ -302,6 +412,7 @@ REPORTS = st.builds(
     mode=st.sampled_from([Mode.OFFBOARD, Mode.OFFBOARD, *Mode]),
     intended=st.sampled_from(Mode),
     failsafe=st.booleans(),
+    killed=st.sampled_from([False, False, False, True]),
 )
 EVENTS = st.tuples(
     st.sampled_from([0.004, 0.1, 0.6, 3.0]),
@@ -364,7 +475,9 @@ def test_arming_is_requested_in_offboard_only_and_never_in_a_flight(events):
                     assert seen.mode is Mode.OFFBOARD and not seen.armed and sequence._desired
                     assert before not in (Phase.FLYING, Phase.RELEASED, Phase.FAILED)
                 if request is Request.DISARM:
-                    assert before not in (Phase.RELEASED, Phase.STREAMING, Phase.FAILED)
+                    given_back = before is Phase.RELEASED and seen.mode is Mode.OFFBOARD
+                    ours = before not in (Phase.RELEASED, Phase.STREAMING, Phase.FAILED)
+                    assert ours or given_back or sequence.stopped
 
 
 @pytest.mark.parametrize("mode", OTHERS)

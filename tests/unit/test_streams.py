@@ -26,7 +26,7 @@ def run(streams, seconds, start=0.0, rates=RATES, result=MavResult.ACCEPTED, ans
         for number, rate in rates.items():
             if rate and time >= due[number] - 1e-9:
                 due[number] += 1.0 / rate
-                streams.count(number)
+                streams.count(number, time)
         request = streams.request(time)
         if request:
             requests.append((round(time, 3), request[0]))
@@ -51,6 +51,15 @@ def test_each_stream_is_requested_once_without_a_warning():
     assert requests[-1][0] < 0.1
     assert streams.warnings == ()
     assert streams.rates[ODOMETRY] == pytest.approx(10.0, abs=0.5)
+
+
+def test_a_mode_stream_that_a_station_switches_off_is_requested_again_within_a_second():
+    streams = StreamCheck()
+    run(streams, 6.0, rates=RATES | {CURRENT_MODE: 2})
+    assert run(streams, 2.0, 6.0, rates=RATES | {CURRENT_MODE: 2}) == []
+    again = [time for time, number in run(streams, 2.0, 8.0) if number == CURRENT_MODE]
+    assert len(again) == 3 and again[0] < 9.0
+    assert run(streams, 2.0, 10.0, rates=RATES | {CURRENT_MODE: 2}) == []
 
 
 def test_a_further_stream_is_requested_and_counted():
@@ -121,7 +130,7 @@ def test_an_autopilot_without_current_mode_is_no_warning():
         time = 0.004 * k
         for number, rate in RATES.items():
             if k % round(250 / rate) == 0:
-                streams.count(number)
+                streams.count(number, time)
         request = streams.request(time)
         if request:
             requests.append(request[0])

@@ -73,10 +73,10 @@ def test_the_table_is_unambiguous_and_every_state_can_be_reached_and_left():
 
 def test_failsafe_ends_only_by_command_and_motors_go_off_on_the_ground():
     ways_out = [event for source, event, _ in TRANSITIONS if source is State.FAILSAFE]
-    assert ways_out == [Event.DISARM]
+    assert ways_out == [Event.DISARM, Event.STOPPED]
     aloft = {State.FLYING, State.HOLDING}
     off = {e for s, e, target in TRANSITIONS if s in aloft and target is State.DISARMED}
-    assert off == {Event.LOST_ARMING}  # the autopilot has disarmed by itself
+    assert off == {Event.LOST_ARMING, Event.STOPPED}  # the autopilot has stopped them
 
 
 def test_every_check_has_a_value():

@@ -96,7 +96,7 @@ class Mission:
         self._over = ""  # why the mission lands before its end
         self._takeoff = self._ground = 0.0
         self._touchdown = Touchdown()
-        self._failsafe_since = math.inf
+        self._fell_since = math.inf  # [s] into failsafe, or by a kill
         self._end: float | None = None
         self._override = MagnetOverride()
         self._descent: Decision | None = None  # to land, while the reference slows down for it
@@ -244,10 +244,10 @@ class Mission:
                 self._wait(state, armed_since is not None)
             elif output.state is State.GROUNDED and armed_since is None:
                 self._check_permission(stamp)
-            if output.state is State.FAILSAFE and self._end is None:
-                deadline = self._failsafe_since + self._parameters.failsafe_timeout
-                if armed_since is None or stamp >= deadline:
-                    self._end = stamp + self._parameters.settle_time
+        if self._end is None and self._fell_since < math.inf:
+            deadline = self._fell_since + self._parameters.failsafe_timeout
+            if armed_since is None or stamp >= deadline:
+                self._end = stamp + self._parameters.settle_time
         if self._end is not None:
             output.done = stamp >= self._end
             if output.done:  # the pre-arm report is that of the next flight
@@ -456,7 +456,10 @@ class Mission:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
         elif state is State.FAILSAFE:
             guidance.rest(stamp, decision.stow)
-            self._failsafe_since = stamp
+            self._fell_since = stamp
+        elif self.changes[-1].event is Event.STOPPED:
+            self._fell_since = stamp
+            self._override.forget()
         elif state is State.DISARMED:
             self._end = stamp + self._parameters.settle_time
             self._override.forget()

@@ -162,7 +162,9 @@ class MissionNode(UamNode):
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
         since = state.armed_since if state.armed else None
-        authority = Authority(state.released_to, state.landed, state.lands)
+        authority = Authority(
+            state.released_to, state.landed, state.lands, state.failed, state.stopped
+        )
         self._stage.autopilot(
             stamp, state.connected, since, state.round_trip, state.loop_delay, authority
         )

@@ -29,12 +29,15 @@ class Authority(NamedTuple):
 
     released_to: who has it in place of the companion, "" if nobody has. landed: whether the
     autopilot reports that the vehicle stands on the ground. lands: whether the autopilot's mode
-    brings the vehicle to the ground by itself.
+    brings the vehicle to the ground by itself. failed: why the bridge flies no more, "" while it
+    may. stopped: a kill has ended the flight for good.
     """
 
     released_to: str = ""
     landed: bool = False
     lands: bool = False
+    failed: str = ""
+    stopped: bool = False
 
 
 @dataclass

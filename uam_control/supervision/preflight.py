@@ -65,6 +65,8 @@ def _at_rest(
     )
     held = seen.authority.released_to
     yield PreflightCheck("control", held or "free", "free", not held)
+    failed = seen.authority.failed
+    yield PreflightCheck("bridge", failed or "ready", "ready", not failed)
     speed = float(np.linalg.norm(seen.state[CHI_DOT, POSITION]))
     limit = f"at most {start_speed:.3g} m/s"
     yield PreflightCheck("speed", f"{speed:.3g} m/s", limit, speed <= start_speed)

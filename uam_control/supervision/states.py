@@ -47,6 +47,7 @@ class Event(Enum):
     RESTARTED_TO_LAND = "lost controller restarted, after_restart: land"
     NO_TOUCHDOWN = "no touchdown in time"
     LOST_ARMING = "the autopilot disarmed"
+    STOPPED = "killed"
     RELEASED = "the autopilot left OFFBOARD"
     REGAINED = "OFFBOARD is back"
     REGAINED_ON_GROUND = "OFFBOARD is back, on the ground"
@@ -122,6 +123,12 @@ TRANSITIONS = (
     Transition(_S.RELEASED, _E.REGAINED_ON_GROUND, _S.DISARMED),
     Transition(_S.RELEASED, _E.LOST_ARMING, _S.DISARMED),
     Transition(_S.FAILSAFE, _E.DISARM, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.STOPPED, _S.DISARMED),
+    Transition(_S.FLYING, _E.STOPPED, _S.DISARMED),
+    Transition(_S.HOLDING, _E.STOPPED, _S.DISARMED),
+    Transition(_S.LANDING, _E.STOPPED, _S.DISARMED),
+    Transition(_S.RELEASED, _E.STOPPED, _S.DISARMED),
+    Transition(_S.FAILSAFE, _E.STOPPED, _S.DISARMED),
 )
 TARGETS = {(source, event): target for source, event, target in TRANSITIONS}
 # causes in a flight without incidents

@@ -1,9 +1,10 @@
 """The supervisor: from observation and operator command to state and decision.
 
 It never arms by itself: `Decision.arm` becomes true by `start`, and false once after that. It
-leaves failsafe only by a command. It disarms on the ground, by a command in failsafe, or after the
-autopilot has disarmed. In the air the last resort is failsafe, in which the autopilot descends
-without the companion. When somebody else takes control it releases the vehicle at once.
+leaves failsafe only by a command. It disarms on the ground, by a command in failsafe, after the
+autopilot has disarmed, or after a kill. In the air the last resort is failsafe, in which the
+autopilot descends without the companion. When somebody else takes control it releases the vehicle
+at once. It lands without a bridge that flies on.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ class Supervisor:
 
     def _as_usual(self, seen: Observation) -> bool:
         """Return whether a tick without finding and command needs no event: flying, no landing."""
-        flying = self.state is State.FLYING and seen.armed
+        flying = self.state is State.FLYING and seen.armed and not seen.authority.failed
         due = seen.landing_due or seen.arrived or seen.end_mission
         return flying and not due and not seen.authority.released_to
 
@@ -208,6 +209,8 @@ class Supervisor:
         """Yield the events of this tick and their causes, the most urgent first."""
         finding, p = self._checks.finding, self._parameters
         level, cause = (finding.level, finding.cause) if finding else (Level.FINE, "")
+        if seen.authority.stopped:
+            yield Event.STOPPED, seen.authority.failed
         if not seen.armed:
             if seen.on_ground:
                 yield _planned(Event.TOUCHDOWN)
@@ -226,6 +229,9 @@ class Supervisor:
             grounded = seen.on_ground or seen.authority.landed
             event = Event.REGAINED_ON_GROUND if grounded else Event.REGAINED
             yield event, event.value
+        failed = f"bridge: {seen.authority.failed}" if seen.authority.failed else ""
+        if failed and self._arm:
+            yield Event.GIVEN_UP, failed
         late = finding is not None and finding.name == SETPOINT_DELAY
         if late and self._arm and self.state is State.GROUNDED:
             yield Event.GIVEN_UP, cause  # waiting does not make a link faster
@@ -241,6 +247,8 @@ class Supervisor:
                 yield event, event.value
         if level is Level.LAND:
             yield Event.LAND_LIMIT, cause
+        if failed:
+            yield Event.LAND_LIMIT, failed
         if seen.touchdown:
             yield _planned(Event.TOUCHDOWN)
         if seen.overdue:

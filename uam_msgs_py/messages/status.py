@@ -116,7 +116,8 @@ class AutopilotState(_Status):
     the last second; loop_delay [s]: from a body-rate setpoint to the gyro's response; None if
     unknown. released_to: who has control in place of the companion, "" if
     nobody has. landed: by the autopilot's land detector. lands: its mode lands the
-    vehicle by itself.
+    vehicle by itself. failed: why the bridge flies no more, "" while it may. stopped: a kill has
+    ended the flight for good.
     """
 
     connected: bool = False
@@ -129,15 +130,22 @@ class AutopilotState(_Status):
     landed: bool = False
     lands: bool = False
     loop_delay: float | None = None
+    failed: str = ""
+    stopped: bool = False
 
     NAME = "autopilot"
-    LATER = ("round_trip", "released_to", "landed", "lands", "loop_delay")
+    LATER = (
+        *("round_trip", "released_to", "landed", "lands", "loop_delay"),
+        *("failed", "stopped"),
+    )
 
     @property
     def level(self) -> bytes:
-        """Return STALE without a connection, WARN with reasons, else OK."""
+        """Return STALE without a connection, ERROR if the bridge has failed, WARN with reasons."""
         if not self.connected:
             return STALE
+        if self.failed:
+            return ERROR
         return WARN if self.reasons or self.released_to else OK
 
     @property

@@ -13,6 +13,9 @@ again; disarmed: arming is refused |
 | in POSITION no sticks for COM_RC_LOSS_T | armed: failsafe, land |
 | battery below BAT_LOW_THR | armed: warning |
 | battery below BAT_CRIT_THR | armed: failsafe by COM_LOW_BAT_ACT; below BAT_EMERGEN_THR land |
+| kill switch engaged | motors stop; armed and mode stay, the motors turn again when it is \
+released within COM_KILL_DISARM; then disarm; arming is refused |
+| flight termination, in flight | motors stop, mode TERMINATION, until a restart |
 | a mode requested in a failsafe | accepted: a person takes over |
 | landed for COM_DISARM_LAND after a flight | disarm |
 | no take-off for COM_DISARM_PRFLT after arming | disarm |
@@ -47,6 +50,8 @@ class Commander:
         self.armed = False
         self.mode = self.intended = Mode.HOLD
         self.failsafe = False
+        self._killed_at = self._updated = -math.inf  # [s] since when the switch is engaged; now
+        self._killed = False
         self.texts: list[tuple[Severity, str]] = []
         self._stream_start = -math.inf
         self._stream_last = -math.inf
@@ -57,6 +62,26 @@ class Commander:
         self._armed_at = 0.0
         self._flew = False
         self._landed_at: float | None = None
+
+    @property
+    def stopped(self) -> bool:
+        """Whether kill switch or flight termination hold the motors."""
+        return self._killed or self.mode is Mode.TERMINATION
+
+    def kill(self, engaged: bool, landed: bool) -> None:
+        """Handle the kill switch; no effect without a change."""
+        if engaged is self._killed:
+            return
+        self._killed, self._killed_at = engaged, self._updated
+        severity = Severity.CRITICAL if engaged and not landed else Severity.INFO
+        self._say(severity, "Kill engaged" if engaged else "Kill disengaged")
+
+    def terminate(self) -> MavResult:
+        """Handle a request for flight termination."""
+        if not self.armed:
+            return MavResult.DENIED
+        self.mode = self.intended = Mode.TERMINATION
+        return MavResult.ACCEPTED
 
     def setpoint(self, time: float) -> None:
         """Register a valid setpoint that arrived at `time` [s]."""
@@ -79,13 +104,15 @@ class Commander:
         moved = max(abs(a - b) for a, b in zip(values, self._sticks_at_rest, strict=True))
         bit = 2 if self.mode is Mode.OFFBOARD else 1
         overriding = int(p["COM_RC_OVERRIDE"]) & bit and 100.0 * moved > p["COM_RC_STICK_OV"]
-        if self.armed and overriding and aided:
+        if self.armed and overriding and aided and self.mode is not Mode.TERMINATION:
             self.intended = self.mode = Mode.POSITION
             self.failsafe = False
             self._say(Severity.CRITICAL, "Pilot took over using sticks")
 
     def request_mode(self, time: float, mode: Mode, aided: bool) -> MavResult:
         """Handle a request for a mode; aided: whether the estimate is valid."""
+        if self.mode is Mode.TERMINATION:
+            return MavResult.TEMPORARILY_REJECTED
         if mode is Mode.OFFBOARD:
             if not self.streaming(time):
                 self._say(
@@ -115,6 +142,8 @@ class Commander:
         if self.armed:
             return MavResult.ACCEPTED
         reasons = list(faults)
+        if self._killed:
+            reasons.append("Preflight Fail: Kill switch engaged")
         if self.mode is not Mode.OFFBOARD:
             reasons.append(
                 f"Preflight Fail: mode {self.mode.name.title()} needs radio control or "
@@ -143,9 +172,13 @@ class Commander:
 
     def update(self, time: float, landed: bool, battery: ChargeState) -> None:
         """Apply the rules for timeouts, battery and automatic disarming; call once per tick."""
+        self._updated = time
         if not self.armed:
             return
         parameters = self._parameters
+        if self._killed and time - self._killed_at > parameters["COM_KILL_DISARM"]:
+            self._disarm("Disarmed by kill-switch")
+            return
         if self.mode is Mode.OFFBOARD and time - self._stream_last > parameters["COM_OF_LOSS_T"]:
             self._fail(Mode.LAND, "no offboard signal, descending")
         if self.mode is Mode.POSITION and not self._has_sticks(time):
@@ -178,7 +211,9 @@ class Commander:
             self._fail(action, f"critical battery level, {words}")
 
     def _fail(self, mode: Mode, text: str) -> None:
-        """Begin a failsafe; `intended` stays."""
+        """Begin a failsafe; `intended` stays. Nothing follows flight termination."""
+        if self.mode is Mode.TERMINATION:
+            return
         self.mode, self.failsafe = mode, True
         self._say(Severity.CRITICAL, f"Failsafe activated: {text}")
 
@@ -190,7 +225,7 @@ class Commander:
     def _disarm(self, text: str) -> None:
         self.armed, self._low_battery = False, None
         self._battery = ChargeState.UNDEFINED
-        if self.failsafe:
+        if self.failsafe and self.mode is not Mode.TERMINATION:
             self.mode, self.failsafe = Mode.HOLD, False
             self.intended = Mode.HOLD
         self._say(Severity.INFO, text)

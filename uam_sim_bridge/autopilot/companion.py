@@ -47,6 +47,7 @@ class Companion:
             "PARAM_SET": self._parameter_set,
             "TIMESYNC": self._timesync,
             "MANUAL_CONTROL": self._manual_control,
+            "RC_CHANNELS_OVERRIDE": self._radio,
         }
 
     def handle(self, time: float, message: Message) -> None:
@@ -173,6 +174,14 @@ class Companion:
             sticks = 1e-3 * m.x, right, up, 1e-3 * m.r
             if all(abs(stick) <= 1.0 for stick in sticks):  # others: not available, or not valid
                 self._autopilot.manual(time, sticks)
+
+    def _radio(self, time: float, m: Message) -> None:
+        """The channels of the pilot's radio, 1000 to 2000 µs: of them the kill switch alone."""
+        parameters = self._autopilot.parameters
+        channel = int(parameters["RC_MAP_KILL_SW"])
+        if channel:
+            share = (getattr(m, f"chan{channel}_raw") - 1000) / 1000.0
+            self._autopilot.kill_switch(share > parameters["RC_KILLSWITCH_TH"])
 
     def _timesync(self, time: float, m: Message) -> None:
         if m.tc1 == 0:

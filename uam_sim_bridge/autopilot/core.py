@@ -64,6 +64,7 @@ class AutopilotStatus(NamedTuple):
     landed: bool
     failsafe: bool
     intended: Mode = Mode.UNKNOWN
+    killed: bool = False  # by the kill switch or flight termination
 
 
 class RateLoop(NamedTuple):
@@ -221,10 +222,15 @@ class Autopilot:
         self._position_modes.sticks[:] = sticks
         self.commander.sticks(time, sticks, self.estimator.aided(time))
 
+    def kill_switch(self, engaged: bool) -> None:
+        """Handle the pilot's kill switch."""
+        self.commander.kill(engaged, self.landing.landed)
+
     def command(self, time: float, command: int, parameters: tuple[float, ...]) -> MavResult:
         """Handle a command with COMMAND_LONG's seven parameters.
 
-        DO_SET_MODE, ARM_DISARM, DO_SET_ACTUATOR, DO_GRIPPER; others: UNSUPPORTED.
+        DO_SET_MODE, ARM_DISARM, DO_FLIGHTTERMINATION, DO_SET_ACTUATOR, DO_GRIPPER; others:
+        UNSUPPORTED.
         """
         first, second = parameters[0], parameters[1]
         if command == MavCmd.ARM_DISARM:
@@ -249,6 +255,8 @@ class Autopilot:
             except ValueError:
                 return MavResult.DENIED
             return self.commander.request_mode(time, mode, self.estimator.aided(time))
+        if command == MavCmd.DO_FLIGHTTERMINATION:
+            return self.commander.terminate() if first > 0.5 else MavResult.DENIED
         if command == MavCmd.DO_SET_ACTUATOR:
             if not parameters[ACTUATORS]:  # index of the set; PX4 accepts others and ignores them
                 given = np.array(parameters[:ACTUATORS])
@@ -296,6 +304,8 @@ class Autopilot:
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
+        if commander.stopped:
+            self.motors[:] = 0.0
         velocity = self._velocity if aided else None
         landing.update(time, commander.armed, descending, float(setpoint[3]), self.rates, velocity)
         return self.motors
@@ -317,10 +327,13 @@ class Autopilot:
     def status(self) -> AutopilotStatus:
         """The state that HEARTBEAT and EXTENDED_SYS_STATE report."""
         c = self.commander
-        return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe, c.intended)
+        landed = self.landing.landed
+        return AutopilotStatus(c.armed, c.mode, landed, c.failsafe, c.intended, c.stopped)
 
     def _own_setpoint(self, mode: Mode, aided: bool, dt: float) -> tuple[np.ndarray, bool]:
         """Return the setpoint (4,) of a mode without a companion, and whether it descends."""
+        if mode is Mode.TERMINATION:
+            return np.zeros(4), False
         if mode in MODES and aided:
             modes = self._position_modes
             setpoint = modes.update(mode, self.estimator.estimate, dt)

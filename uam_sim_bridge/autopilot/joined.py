@@ -21,6 +21,7 @@ from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
     HEARTBEAT_TIMEOUT,
+    LINK_GAP,
     OffboardSequence,
     Reported,
     Request,
@@ -64,7 +65,7 @@ class JoinedAutopilot(FlightState):
         super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
-        self.landed = self.failsafe = False
+        self.landed = self.failsafe = self.killed = False
         self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
         self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
@@ -84,6 +85,11 @@ class JoinedAutopilot(FlightState):
         self._heartbeat_due = self._landed_due = -math.inf  # [s]
         self._heartbeat = self._landed = False  # sent, not yet received
         self._answers: list[tuple[Request, MavResult]] = []
+
+    @property
+    def loss_time(self) -> float:
+        """For how long [s] the autopilot stays in OFFBOARD without setpoints; at least LINK_GAP."""
+        return max(LINK_GAP, self.autopilot.parameters["COM_OF_LOSS_T"])
 
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
@@ -126,6 +132,7 @@ class JoinedAutopilot(FlightState):
             self._received_at = time
             self.take_heartbeat(time, status.mode, status.armed)
             self.intended, self.failsafe = status.intended, status.failsafe
+            self.killed = status.killed
 
     def tick(self, time: float) -> None:
         """Send the request of the sequence, if there is one."""
@@ -136,6 +143,7 @@ class JoinedAutopilot(FlightState):
             self.intended,
             self.failsafe,
             self._delivered,
+            self.killed,
         )
         request = self.sequence.update(time, seen)
         if request is not None:

@@ -13,7 +13,7 @@ from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 _NAN = float("nan")
 _NO_COVARIANCE = [_NAN] * 21
 _LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
-_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
+_STANDBY, _ACTIVE, _CRITICAL, _TERMINATED = 3, 4, 5, 8  # MAV_STATE
 _GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
 _RADIO = mavlink2.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 _NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # MAVLink's values for "unknown"
@@ -25,13 +25,15 @@ _AIDED = (
     | mavlink2.ESTIMATOR_PRED_POS_HORIZ_REL
 )
 _IMU_FIELDS = 0x3F  # HIGHRES_IMU.fields_updated: accelerometer and gyroscope
-FASTEST = 0.004  # s
+TICK = 0.004  # s, shortest interval
+FASTEST = {mavlink2.MAVLINK_MSG_ID_CURRENT_MODE: 0.5}  # [s] of it, besides each change (PX4)
 
 
 def heartbeat(autopilot: Autopilot, time: float) -> Message:
     """HEARTBEAT of a PX4 quadrotor."""
     status = autopilot.status
     state = _CRITICAL if status.failsafe else _ACTIVE if status.armed else _STANDBY
+    state = _TERMINATED if status.killed else state
     armed = mavlink2.MAV_MODE_FLAG_SAFETY_ARMED if status.armed else 0
     return mavlink2.MAVLink_heartbeat_message(
         mavlink2.MAV_TYPE_QUADROTOR,
@@ -159,8 +161,6 @@ class Telemetry:
 
     def set_interval(self, number: int, microseconds: float) -> bool:
         """Handle SET_MESSAGE_INTERVAL: -1 off, 0 default; False if the stream does not exist."""
-        if number == mavlink2.MAVLINK_MSG_ID_CURRENT_MODE:
-            return True  # sent on a change, and at its default interval
         if number not in STREAMS or not math.isfinite(microseconds):
             return False
         if microseconds < 0.0:
@@ -168,7 +168,7 @@ class Telemetry:
         elif microseconds == 0.0:
             self._intervals[number] = STREAMS[number][1]
         else:
-            self._intervals[number] = max(FASTEST, microseconds * 1e-6)
+            self._intervals[number] = max(FASTEST.get(number, TICK), microseconds * 1e-6)
         self._due[number] = -math.inf
         return True
 

@@ -55,6 +55,8 @@ class AutopilotTopics:
             report.landed,
             report.mode.lands,
             report.loop_delay,
+            report.failed,
+            report.stopped,
         )
         message = state.to_message(stamp)
         if self._link.parameters.required:

@@ -36,7 +36,7 @@ from uam_msgs_py.messages.control import (
 )
 from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter, read_pose
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
-from uam_msgs_py.messages.status import OK, WARN, MissionStatus
+from uam_msgs_py.messages.status import ERROR, OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.local_delivery import LocalDelivery
@@ -123,7 +123,7 @@ class MavlinkBridgeNode(UamNode):
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
-        self._last_tick = time.monotonic()
+        self._begun = self._last_tick = time.monotonic()
         self._warm_up()
 
         self._setpoint = self.publisher(topics.SETPOINT)
@@ -251,7 +251,10 @@ class MavlinkBridgeNode(UamNode):
             self._late.update(stamp / SECOND)
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
-        self.stage.hear(stamp)
+        now, begun = time.monotonic(), self._begun
+        self._begun = now
+        real = self._options.clock == "realtime" and self.ticks
+        self.stage.hear(stamp, now - begun if real else 0.0)
         if self._magnet is not None:
             self._magnet.update(stamp / SECOND)
 
@@ -354,7 +357,8 @@ class MavlinkBridgeNode(UamNode):
             "thrust factor [1]": f"{self.stage.map.thrust_factor:.4f}",
         }
         summary = "; ".join((sequence.phase.value, *notes))
-        return WARN if notes else OK, summary, values
+        level = WARN if notes else OK
+        return ERROR if sequence.failure else level, summary, values
 
     def _warm_up(self) -> None:
         """Compile the functions of a tick before the flight: a first call takes a second."""

@@ -27,10 +27,16 @@ class AutopilotPort(Protocol):
     landed: bool
     intended: Mode  # chosen last by a person or a companion; UNKNOWN if not reported
     failsafe: bool  # the autopilot flies its own failsafe
+    killed: bool  # the kill switch or flight termination holds the motors
     armed_since: float | None  # [s] tick at which it was first known armed; None while it is not
 
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
+        ...
+
+    @property
+    def loss_time(self) -> float:
+        """For how long [s] the autopilot stays in OFFBOARD without setpoints: COM_OF_LOSS_T."""
         ...
 
     @property

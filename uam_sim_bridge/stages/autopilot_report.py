@@ -12,13 +12,15 @@ from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 
 REPORT_PERIOD = 200_000_000  # [ns]
+KILL_SWITCH = "the kill switch is engaged, or flight termination is active"
 
 
 class AutopilotReport(NamedTuple):
     """The autopilot's state as received by a tick.
 
     reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
-    companion, "" if nobody has; landed: by the autopilot's land detector; armed_since [ns]: first
+    companion, "" if nobody has; landed: by the autopilot's land detector; failed: why the bridge
+    flies no more, "" while it may; stopped: a kill has ended the flight; armed_since [ns]: first
     tick with an armed autopilot, None while disarmed; round_trip, loop_delay [s]: None if unknown.
     """
 
@@ -29,13 +31,15 @@ class AutopilotReport(NamedTuple):
     reasons: tuple[str, ...]
     released_to: str = ""
     landed: bool = False
+    failed: str = ""
+    stopped: bool = False
     armed_since: int | None = None
     round_trip: float | None = None
     loop_delay: float | None = None
 
     def differs(self, other: AutopilotReport | None) -> bool:
         """Whether a field other than `armed_since` and the delays differs from `other`."""
-        return other is None or self[:7] != other[:7]
+        return other is None or self[:9] != other[:9]
 
 
 class AutopilotReports:
@@ -77,4 +81,6 @@ class AutopilotReports:
             sequence.reasons,
             sequence.released_to,
             autopilot.landed,
+            sequence.failure or (KILL_SWITCH if autopilot.killed else ""),
+            sequence.stopped,
         )

@@ -251,7 +251,8 @@ def send_setpoint(tick: ControlTick) -> bool:
 def take_report(tick: ControlTick, report: AutopilotReport) -> None:
     """Give the bridge's report of the present tick to mission and attitude law."""
     stamp = tick.signals.stamp
-    authority = Authority(report.released_to, report.landed, report.mode.lands)
+    held = report.released_to, report.landed, report.mode.lands, report.failed, report.stopped
+    authority = Authority(*held)
     tick.mission.autopilot(
         stamp,
         report.connected,

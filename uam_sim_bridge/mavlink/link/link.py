@@ -15,6 +15,7 @@ from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnet
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
     HEARTBEAT_TIMEOUT,
+    LINK_GAP,
     OffboardSequence,
     Reported,
     Request,
@@ -39,6 +40,7 @@ from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
 from uam_sim_bridge.mavlink.transport.transport import Transport
 
 HEARTBEAT_PERIOD = 1.0  # s
+LOSS_TIME = 1.0  # s, PX4's COM_OF_LOSS_T until it has been read
 UNSIGNED = (
     "the autopilot does not sign its messages, and signing_key is set: all are refused. PX4 v1.16 "
     "has no MAVLink signing: start without signing_key, on a link that nobody else reaches"
@@ -157,6 +159,11 @@ class OffboardLink(FlightState):
         return self._transport.dropped
 
     @property
+    def loss_time(self) -> float:
+        """For how long [s] the autopilot stays in OFFBOARD without setpoints; at least LINK_GAP."""
+        return max(LINK_GAP, self.values.get("COM_OF_LOSS_T", LOSS_TIME))
+
+    @property
     def round_trip(self) -> float | None:
         """How long answers take [s], the quickest of the last second; None while not known."""
         return self.time_sync.quickest
@@ -179,7 +186,7 @@ class OffboardLink(FlightState):
                     self._note_foreign(message)
                 else:
                     self.statistics.count(message.get_srcComponent(), message.get_seq())
-                    self.streams.count(message.get_msgId())
+                    self.streams.count(message.get_msgId(), time)
                     self._handle(time, message)
         self.statistics.tick(time)
 
@@ -213,7 +220,8 @@ class OffboardLink(FlightState):
         connected = self.maintain(time)
         self.settle(time)
         delivered = self.time_sync.delivered
-        seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
+        reported = self.armed, self.mode, self.intended, self.failsafe, delivered, self.killed
+        seen = Reported(connected, *reported)
         request = self.sequence.update(time, seen)
         if request is not None:
             self._request(request)
@@ -316,10 +324,9 @@ class OffboardLink(FlightState):
             since_boot = m.time_boot_ms * 1e-3
         else:
             return
-        restarted = self._reboot.time_since_boot(since_boot)
-        if not restarted and kind == "TIMESYNC" and m.tc1 != 0:
-            restarted = self.time_sync.answer(self._synchronised(time), m.tc1, m.ts1)
-        if restarted:
+        if kind == "TIMESYNC" and m.tc1 != 0:
+            self.time_sync.answer(self._synchronised(time), m.tc1, m.ts1)
+        if self._reboot.time_since_boot(since_boot):
             self.reboots += 1
             self.time_sync.restart()
             self._restart_requests()

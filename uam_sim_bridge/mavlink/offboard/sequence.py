@@ -14,8 +14,16 @@ send. The bridge and the direct engine use the same class. All times are simulat
     DISARMING  disarming is requested
     DISARMED   done
     FAILED     too many attempts, taken over before arming, disarmed or rebooted in flight, killed;
-               `reasons` says why. Only a new desired state (`set_desired`) starts again: the
-               vehicle is never armed again in the air by itself
+               `failure` and `reasons` say why. Only a new desired state (`set_desired`) starts
+               again: the vehicle is never armed again in the air by itself. Who takes control
+               then has it: RELEASED
+
+A kill is final: by command, by the pilot's switch, or by the autopilot's flight termination. From
+then on `stopped` is true: no setpoint with thrust is sent, and disarming is requested, also when
+the switch goes off again.
+
+After a gap of the stream in which the autopilot's failsafe has begun, the vehicle is RELEASED, and
+nothing is sent until the autopilot's reports are new again: `begin`.
 
 `return_after_lost_link` is the only exception to the rule of RELEASED: see `_may_return`.
 """
@@ -45,6 +53,11 @@ LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost;
 LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OFFBOARD because of it
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
 ARMING_UNDERWAY = 2.0  # s after a request to arm in which the autopilot may still obey it
+NEW_REPORTS = 0.6  # s after a gap until each report is new: PX4 sends its mode twice a second
+FORCED = 5.0  # s after a kill: disarmed by force, as PX4 does (COM_KILL_DISARM); it may lie tilted
+KILLED = "kill engaged"  # PX4's text; the heartbeat, once a second, misses a short kill
+BY_SWITCH = "the pilot's kill switch has stopped the motors"
+BY_TERMINATION = "flight termination has stopped the motors"
 REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
 _KEPT_REASONS = 5
 
@@ -89,7 +102,8 @@ class Reported(NamedTuple):
     connected: the last heartbeat is recent. intended: the mode that was chosen last by a person or
     a companion (CURRENT_MODE.intended_custom_mode), UNKNOWN without that message. failsafe: the
     autopilot flies its own failsafe (HEARTBEAT.system_status CRITICAL). delivered [s]: when the
-    newest message was sent that certainly arrived.
+    newest message was sent that certainly arrived. killed: the kill switch or flight termination
+    holds the motors (HEARTBEAT.system_status FLIGHT_TERMINATION).
     """
 
     connected: bool
@@ -98,6 +112,7 @@ class Reported(NamedTuple):
     intended: Mode = Mode.UNKNOWN
     failsafe: bool = False
     delivered: float = math.inf
+    killed: bool = False
 
 
 @dataclass(frozen=True)
@@ -140,15 +155,16 @@ class OffboardSequence:
 
     `phase`; `reasons`: the autopilot's answers to refused requests, with advice, newest last;
     `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when the
-    autopilot must run its own failsafe; OFFBOARD is then requested no more.
+    autopilot must run its own failsafe; OFFBOARD is then requested no more. `failure`: why the
+    sequence has given up, else ""; `stopped`: the motors must stay still until the next flight.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
         self.parameters = (parameters or OffboardParameters()).validated()
         self.phase = Phase.WAITING
         self.reasons: tuple[str, ...] = ()
-        self.released_to = ""
-        self.let_go = False
+        self.released_to = self.failure = ""
+        self.let_go = self.stopped = False
         self._desired = False  # armed
         self._stream_start = math.inf
         self._asked = -math.inf
@@ -163,7 +179,11 @@ class OffboardSequence:
         self._chosen_at = -math.inf  # [s] since when
         self._returns = 0  # requests of return_after_lost_link in this flight
         self._lost_link = False  # the autopilot left OFFBOARD because it had no setpoints
-        self._killed = False
+        self._person = False  # a person has chosen the mode of the released vehicle
+        self._begun = -math.inf  # [s] the last tick that began
+        self._resumed = -math.inf  # [s] newest end of a gap of the stream
+        self._stop: Request | None = None  # repeated until the vehicle is disarmed
+        self._halted = math.inf  # [s] since when
         self._time = 0.0  # [s] of the last update
         self._passing: dict[str, float] = {}  # reason that may pass → [s] since when
 
@@ -192,10 +212,13 @@ class OffboardSequence:
         self._forget()
         self._attempts, self._asked = 0, -math.inf
         self._returns, self._regain_requests = 0, 0
-        self._killed = self._killed and not armed
+        if armed:
+            self._stop, self.stopped = None, False
         if self.phase in (Phase.FAILED, Phase.DISARMED):
-            self.phase, self._in_flight = Phase.STREAMING, False
+            self._in_flight = ours = self._in_flight and not armed
+            self.phase = Phase.DISARMING if ours else Phase.STREAMING
             self.released_to, self._offboard_since = "", None
+            self.failure = self.failure if self.stopped else ""
 
     def regain(self, commanded: float) -> None:
         """Request OFFBOARD again by an operator's command of `commanded` [s].
@@ -210,8 +233,41 @@ class OffboardSequence:
 
         The first request is sent even if the vehicle is reported disarmed: it may be arming.
         """
-        self._killed, self._asked = True, -math.inf
-        self._fail("killed by command")
+        self._halt(Request.KILL, "killed by command")
+
+    def _halt(self, stop: Request, why: str) -> None:
+        """End the flight for good."""
+        self._stop, self._asked, self.stopped = stop, -math.inf, True
+        self._halted = self._time
+        self.released_to = ""
+        self._fail(why)
+
+    def begin(self, time: float, loss_time: float, frozen: float = 0.0) -> None:
+        """Begin the tick `time` [s], before its setpoint is made.
+
+        loss_time [s]: without setpoints until the autopilot's failsafe begins; frozen [s]: for how
+        long this process has not run, by another clock than that of the ticks, which may be late.
+        """
+        if self.phase is Phase.FLYING and not self.let_go:
+            if max(time - self._streamed, frozen) > loss_time:
+                self._stream_lost = self._resumed = time
+                self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
+        elif self.withheld and max(time - self._begun, frozen) > loss_time:
+            self._resumed = time
+        self._begun = time
+
+    @property
+    def withheld(self) -> bool:
+        """Whether a gap of the stream has just ended, and the newest reports may be older.
+
+        The autopilot returns to OFFBOARD with the first setpoint: the vehicle may stand by now.
+        """
+        return self.phase is Phase.RELEASED and self._begun - self._resumed < NEW_REPORTS
+
+    @property
+    def after_loss(self) -> bool:
+        """Whether the autopilot's failsafe has the vehicle because the stream was lost."""
+        return self.phase is Phase.RELEASED and self._lost_link
 
     def streamed(self, time: float) -> None:
         """Note that a setpoint was sent at `time` [s]."""
@@ -227,16 +283,22 @@ class OffboardSequence:
             and seen.connected
             and seen.armed
             and seen.mode is Mode.OFFBOARD
-            and not self._killed
+            and not seen.killed
             and time - min(self._streamed, seen.delivered) <= LINK_GAP
         ):
             return None  # most ticks: nothing has changed
         if self._in_flight and time - min(self._streamed, seen.delivered) > LINK_GAP:
             self._stream_lost = time
-        if self._killed:
+        terminated = seen.mode is Mode.TERMINATION
+        if (seen.killed or terminated) and not self.stopped and self._has_motors:
+            self._halt(Request.DISARM, BY_TERMINATION if terminated else BY_SWITCH)
+        theirs = self._stop is Request.DISARM and not (terminated or seen.mode is Mode.OFFBOARD)
+        if self._stop is not None and not theirs:
             if seen.armed or self._asked == -math.inf:
-                return self._ask(time, Phase.FAILED, Request.KILL)
-            self._killed = time - self._asked < self.parameters.retry_interval
+                forced = time - self._halted >= FORCED
+                return self._ask(time, Phase.FAILED, Request.KILL if forced else self._stop)
+            if time - self._asked >= self.parameters.retry_interval:
+                self._stop = None
         if not seen.connected:
             if self.phase not in _KEPT_WITHOUT_LINK:
                 self.phase = Phase.WAITING
@@ -252,10 +314,11 @@ class OffboardSequence:
             return self._keep_flying(time, seen, away)
         if self.phase is Phase.RELEASED:
             return self._stay_released(time, seen)
-        if self.phase is Phase.FAILED:
+        failed = self.phase is Phase.FAILED
+        if seen.armed and (away if failed else seen.mode is not Mode.OFFBOARD):
+            self._release(time, seen)  # somebody else flies
             return None
-        if seen.armed and seen.mode is not Mode.OFFBOARD:  # somebody else flies
-            self._release(time, seen)
+        if failed:
             return None
         if left:
             self._fail(f"{seen.mode.name} was chosen before arming: start again")
@@ -291,7 +354,9 @@ class OffboardSequence:
         self._lasting_reason(f"{request.value} refused ({result_word(result)})")
 
     def text(self, severity: int, text: str) -> None:
-        """Handle a STATUSTEXT; warnings and worse become reasons."""
+        """Handle a STATUSTEXT; warnings and worse become reasons, "Kill engaged" ends a flight."""
+        if text.strip().lower() == KILLED and self._has_motors and not self.stopped:
+            self._halt(Request.DISARM, BY_SWITCH)
         if severity <= Severity.WARNING:
             # PX4 ends a text with a tab if an event has the same text
             self._lasting_reason(text.strip())
@@ -316,7 +381,13 @@ class OffboardSequence:
             self._reason(earlier)
         self._passing.clear()
         self._reason(text)
+        self.failure = "; ".join(self.reasons) if self.phase in _BEGIN_AND_END else text
         self.phase = Phase.FAILED
+
+    @property
+    def _has_motors(self) -> bool:
+        """Whether motors turn, or may turn at once, that this sequence has asked for."""
+        return self._in_flight or self.phase is Phase.ARMING
 
     def _reason(self, text: str) -> None:
         text = with_advice(text)
@@ -368,7 +439,7 @@ class OffboardSequence:
         return None
 
     def _fly(self) -> None:
-        self.phase, self._attempts = Phase.FLYING, 0
+        self.phase, self._attempts, self.failure = Phase.FLYING, 0, ""
         self._forget()
         self.released_to, self._in_flight, self._regain_requests = "", True, 0
 
@@ -390,31 +461,40 @@ class OffboardSequence:
         self._in_flight, self._offboard_since = True, None
         self._chosen, self._chosen_at = (seen.mode, seen.intended), time
         self._lost_link = time - self._stream_lost < LOST_RECENTLY
+        self.failure = self.failure if self.stopped else ""
+        self._person = False
         self.released_to = self._holder(seen)
         self._reason(f"left OFFBOARD: {self.released_to}, has control")
 
     def _holder(self, seen: Reported) -> str:
-        """Return who has control, and in which mode, in one line."""
-        if seen.intended is Mode.OFFBOARD or (seen.failsafe and seen.intended is Mode.UNKNOWN):
+        """Return who has control, and in which mode, in one line.
+
+        PX4 goes back to OFFBOARD as the chosen mode just before it reports that it has disarmed: a
+        person's landing stays one.
+        """
+        self._person |= seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN)
+        failsafe = seen.intended is Mode.OFFBOARD or seen.failsafe
+        where = "" if seen.mode is Mode.UNKNOWN else f", in {seen.mode.name}"
+        if failsafe and not self._person:
             cause = " after a lost stream of setpoints" if self._lost_link else ""
-            return f"the autopilot's failsafe{cause}, in {seen.mode.name}"
-        return f"the pilot or a ground station, in {seen.mode.name}"
+            return f"the autopilot's failsafe{cause}{where}"
+        return f"the pilot or a ground station{where}"
 
     def _stay_released(self, time: float, seen: Reported) -> Request | None:
         if not seen.armed:
             self._fail(f"disarmed while released to {self.released_to}")
             return None
         if seen.mode is Mode.OFFBOARD:
-            self._fly()
+            if not self.withheld:
+                self._fly()
             return None
-        if seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN):
-            self._lost_link = False  # a person has chosen a mode since
         chosen = seen.mode, seen.intended
         if chosen != self._chosen and seen.intended is not Mode.OFFBOARD:
             # a person has chosen another mode since the command
             self._regain_requests, self._chosen_at = 0, time
         self._chosen = chosen
         self.released_to = self._holder(seen)
+        self._lost_link &= not self._person
         if self._regain_requests > 0:
             request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)
             self._regain_requests -= request is not None

@@ -7,6 +7,9 @@
 | valid or idle, while somebody else has control | the vehicle's rates, attitude and thrust; \
 without commands, or in the air before the first flight, none |
 | not finite, malformed or none, on the ground | as idle |
+| after a kill | thrust 0; none if the autopilot is not in OFFBOARD |
+| after a gap in which the autopilot's failsafe began | none until its reports are new, and on \
+the ground none: it lands and disarms |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
 failsafe acts |
@@ -50,7 +53,8 @@ class Situation(NamedTuple):
     """State of the autopilot.
 
     let_go: the mission requires the autopilot's failsafe. released: somebody else has control.
-    followed: it flies the setpoints, in OFFBOARD.
+    followed: it flies the setpoints, in OFFBOARD. stopped: the motors must stay still. withheld:
+    its reports may be older than a gap of the stream. lost: its failsafe acts since such a gap.
     """
 
     armed: bool
@@ -58,6 +62,9 @@ class Situation(NamedTuple):
     let_go: bool
     released: bool = False
     followed: bool = True
+    stopped: bool = False
+    withheld: bool = False
+    lost: bool = False
 
 
 def silent(text: str, key: str | None) -> None:
@@ -119,7 +126,7 @@ class SetpointSource:
         now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
         [N m, FLU], None for idle; attitude, reference (3, 3): see `Desired`.
         """
-        if situation.let_go:
+        if situation.let_go or situation.stopped:
             return self.without(now, situation)
         if situation.released:
             return self._present(now, situation)
@@ -143,8 +150,12 @@ class SetpointSource:
 
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] without valid commands."""
-        armed, landed, let_go, released, _ = situation
+        armed, landed, let_go, released = situation[:4]
         high = self._high(situation)
+        if situation.stopped:
+            return self._idle if situation.followed else None
+        if self._silent(situation):
+            return None
         if released and armed and high:
             self._say(f"no usable commands while released: {NO_STREAM}", "hold")
             return None
@@ -164,6 +175,8 @@ class SetpointSource:
 
         When OFFBOARD comes back, the autopilot begins with it: it must be free of a jump.
         """
+        if self._silent(situation):
+            return None
         if not situation.armed or (situation.landed and not self._high(situation)):
             return self._idle
         if not self._hold.mean_thrust:
@@ -198,6 +211,11 @@ class SetpointSource:
     def _handed_over(self, now: float) -> bool:
         """Whether control came back just before, and the mission may not have resumed yet."""
         return now - self._present_at < HANDOVER
+
+    def _silent(self, situation: Situation) -> bool:
+        """Whether a setpoint would bring back an autopilot that lands, or has landed."""
+        stands = situation.landed or not self._high(situation)
+        return situation.withheld or (situation.lost and situation.armed and stands)
 
     def _low(self, now: float, situation: Situation) -> bool:
         """Whether an idle command means thrust 0."""

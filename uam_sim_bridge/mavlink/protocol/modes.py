@@ -9,25 +9,41 @@ from uam_control.settings.plain_members import plain_members
 
 @plain_members
 class Mode(Enum):
-    """Flight modes that the bridge uses; value: PX4's (main mode, sub mode)."""
+    """PX4's flight modes; value: (main mode, sub mode)."""
 
     MANUAL = (1, 0)
     ALTITUDE = (2, 0)
     POSITION = (3, 0)
+    ORBIT = (3, 1)
+    POSITION_SLOW = (3, 2)
     TAKEOFF = (4, 2)
     HOLD = (4, 3)
     MISSION = (4, 4)
     RETURN = (4, 5)
     LAND = (4, 6)  # also PX4's failsafe mode Descend
+    FOLLOW = (4, 8)
+    PRECISION_LAND = (4, 9)
+    VTOL_TAKEOFF = (4, 10)
+    EXTERNAL1 = (4, 11)  # modes that other programs register
+    EXTERNAL2 = (4, 12)
+    EXTERNAL3 = (4, 13)
+    EXTERNAL4 = (4, 14)
+    EXTERNAL5 = (4, 15)
+    EXTERNAL6 = (4, 16)
+    EXTERNAL7 = (4, 17)
+    EXTERNAL8 = (4, 18)
+    GUIDED_COURSE = (4, 19)
     ACRO = (5, 0)
     OFFBOARD = (6, 0)
     STABILIZED = (7, 0)
+    TERMINATION = (10, 0)  # the motors stand for good
+    ALTITUDE_CRUISE = (11, 0)
     UNKNOWN = (0, 0)
 
     @property
     def lands(self) -> bool:
         """Whether the mode brings the vehicle to the ground by itself."""
-        return self in (Mode.LAND, Mode.RETURN)
+        return self in (Mode.LAND, Mode.RETURN, Mode.PRECISION_LAND)
 
     @property
     def custom_mode(self) -> int:
@@ -80,6 +96,7 @@ class MavCmd(IntEnum):
     """MAV_CMD: the values in use."""
 
     DO_SET_MODE = 176
+    DO_FLIGHTTERMINATION = 185
     DO_SET_ACTUATOR = 187
     DO_GRIPPER = 211
     ARM_DISARM = 400

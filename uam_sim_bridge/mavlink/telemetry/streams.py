@@ -26,6 +26,7 @@ RATES: dict[int, float] = {
 ONLY_COUNTED = (mavlink2.MAVLINK_MSG_ID_HEARTBEAT,)
 # sent on a change: PX4 sends CURRENT_MODE at once when the mode changes, HEARTBEAT once a second
 ON_CHANGE: dict[int, float] = {mavlink2.MAVLINK_MSG_ID_CURRENT_MODE: 50.0}
+SILENT = 0.7  # s without one of these, which PX4 sends twice a second, too: requested again
 ENOUGH = 0.5  # fraction of the desired rate, below which a stream is too slow
 WINDOW = 4.0  # s, counting window
 ANSWER_TIMEOUT = 0.5  # s, then the next request is sent without an answer
@@ -52,14 +53,17 @@ class StreamCheck:
         self._attempts = dict.fromkeys((*self._desired, *ON_CHANGE), 0)
         self._refused: dict[int, str] = {}
         self._counts = dict.fromkeys(self._desired, 0)
+        self._heard = dict.fromkeys(ON_CHANGE, math.inf)  # [s] newest message
         self._pending: int | None = None
         self._requested_at = -math.inf
         self._window: float | None = None  # s, start of the window; None during requests
 
-    def count(self, number: int) -> None:
-        """Count a received message of this id."""
+    def count(self, number: int, time: float) -> None:
+        """Count a message of this id received at `time` [s]."""
         if number in self._counts:
             self._counts[number] += 1
+        elif number in self._heard:
+            self._heard[number] = time
 
     def answer(self, result: int) -> None:
         """Store the result (MAV_RESULT) of the last request."""
@@ -76,10 +80,13 @@ class StreamCheck:
         if self._pending is not None and time - self._requested_at < ANSWER_TIMEOUT:
             return None
         self._pending = None
-        if not self._queue:
+        silent = [n for n, heard in self._heard.items() if time - heard > SILENT]
+        if not (self._queue or silent):
             self._judge(time)
             return None
-        number = self._queue.pop(0)
+        number = silent[0] if silent else self._queue.pop(0)
+        if silent:
+            self._heard[number] = time
         self._attempts[number] += 1
         self._pending, self._requested_at = number, time
         return number, 1e6 / (self._desired | ON_CHANGE)[number]

@@ -20,6 +20,7 @@ _SLOWEST_GAIN = 0.05  # lowest gain of the averages
 _SHORTEST = 1e-3  # s, lower bound of a round trip in the weights
 _NEWEST = 5  # answers of one second
 BACKWARDS = 1.0  # s: a smaller step back may be messages out of order
+BEHIND = 5  # messages in a row that show a reboot
 _WRAP = 2**32 * 1e-3  # s, period of a 32-bit time in milliseconds: 49.7 days
 
 
@@ -62,21 +63,21 @@ class TimeSync:
         self._requested.append(ts1)
         return ts1
 
-    def answer(self, time: float, tc1: int, ts1: int) -> bool:
-        """Process an answer received at `time` [s]; True if the autopilot's clock has jumped back.
+    def answer(self, time: float, tc1: int, ts1: int) -> None:
+        """Process an answer received at `time` [s].
 
         tc1: autopilot's time [ns]; ts1: time of the request [ns]. Answers to other requests are
-        ignored. A jump forward is no restart of the autopilot, whose clock then begins anew: the
-        ticks of a simulation fell behind an autopilot with its own clock.
+        ignored. A jump of the offset is no restart of the autopilot: on a busy machine the ticks
+        fall behind and catch up again.
         """
         if ts1 not in self._requested:
-            return False
+            return
         self._requested.remove(ts1)
         self.delivered = ts1 * 1e-9
         asked = ts1 * 1e-9
         if time < asked - BACKWARDS:  # the companion's clock went back: a new simulation
             self.restart()
-            return False
+            return
         time = max(time, asked)  # an answer in the tick of its request is early by rounding
         round_trip = time - asked
         offset = tc1 * 1e-9 - (asked + time) / 2.0
@@ -85,14 +86,10 @@ class TimeSync:
         if self.offset is not None and abs(offset - self.offset) > JUMP + unsure:
             self._jumps += 1
             if self._jumps < JUMPS_TO_RESET:
-                return False
-            back = offset < self.offset
+                return
             self.restart()
-            self._take(offset, round_trip)
-            return back
         self._jumps = 0
         self._take(offset, round_trip)
-        return False
 
     def _take(self, offset: float, round_trip: float) -> None:
         self._count += 1
@@ -113,18 +110,28 @@ def nanoseconds(time: float) -> int:
 
 
 class RebootDetector:
-    """Compares successive times since boot of ATTITUDE_QUATERNION and TIMESYNC."""
+    """Compares successive times since boot of ATTITUDE_QUATERNION and TIMESYNC.
+
+    A reboot is BEHIND messages in a row that are older than the latest by BACKWARDS, in order among
+    themselves: packets that come late, between newer ones, are none.
+    """
 
     def __init__(self) -> None:
         self._latest: float | None = None
+        self._behind: list[float] = []
 
     def time_since_boot(self, time: float) -> bool:
         """Return True if `time` [s since boot] shows a restart."""
         latest = self._latest
-        if latest is None or time > latest:
-            self._latest = time
+        if latest is None or latest - time < BACKWARDS:
+            self._latest = time if latest is None else max(time, latest)
+            self._behind.clear()
             return False
-        if latest - time < BACKWARDS:
+        if self._behind and not 0.0 <= time - self._behind[-1] < BACKWARDS:
+            self._behind.clear()
+        self._behind.append(time)
+        if len(self._behind) < BEHIND:
             return False
+        self._behind.clear()
         self._latest = time
         return latest - time < _WRAP - 60.0

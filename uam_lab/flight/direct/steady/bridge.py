@@ -95,13 +95,13 @@ class BridgePart:
             and not (bridge._orders or bridge.hands or bridge.identification.magnet_waits)
             and not (port._outgoing or port._incoming or port._answers or commander.texts)
             and not (source.holding or hold._thrust is None)
-            and told == status == (True, Mode.OFFBOARD, False, port.failsafe, port.intended)
-            and (port.armed, port.mode, port.landed, port.failsafe)
-            == (True, Mode.OFFBOARD, False, False)
+            and told == status == (True, Mode.OFFBOARD, False, port.failsafe, port.intended, False)
+            and (port.armed, port.mode, port.landed, port.failsafe, port.killed)
+            == (True, Mode.OFFBOARD, False, False, False)
             and port._doubted is None
             and sequence.phase is Phase.FLYING
             and sequence._desired
-            and not sequence._killed
+            and not sequence.stopped
             and sequence._offboard_since is not None
             and reports._reported == what
             and what[0]  # connected

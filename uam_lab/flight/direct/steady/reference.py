@@ -76,7 +76,7 @@ class ReferencePart:
             and stage._last == stamp
             and not (stage._reports or mission._requests or output.done or mission._over)
             and stage._armed_since is not None
-            and not stage._authority.released_to
+            and not (stage._authority.released_to or stage._authority.failed)
             and decision.guide is Guide.SCENARIO
             and decision is mission._followed
             and mission._end is None
