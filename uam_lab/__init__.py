@@ -8,6 +8,8 @@ See docs/library.md.
 from __future__ import annotations
 
 import importlib
+import os
+from importlib.util import find_spec
 from typing import Any
 
 # name → module; imported when it is used, because each node of a flight imports this package
@@ -23,6 +25,11 @@ OFFERED = {
     "NotInTime": "errors",
 }
 __all__ = list(OFFERED)
+
+
+backend = os.environ.get("MPLBACKEND", "")
+if backend.startswith("module://") and find_spec(backend[9:].split(".")[0]) is None:
+    del os.environ["MPLBACKEND"]  # of a notebook that runs in another Python: no figure without
 
 
 def __getattr__(name: str) -> Any:

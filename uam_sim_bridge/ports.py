@@ -251,7 +251,7 @@ def flights(folder: Path | None = None) -> list[RunningFlight]:
     found = []
     for instance in instances_in_use(folder):
         try:
-            domain, namespace = lock_file(folder, instance).read_text().split()
+            domain, namespace = lock_file(folder, instance).read_text(encoding="utf-8").split()
         except (OSError, ValueError):  # it has just ended, or has not written it yet
             domain, namespace = ports_of(instance).domain, "/"
         found.append(RunningFlight(instance, int(domain), namespace))

@@ -52,7 +52,7 @@ def test_the_order_is_that_of_the_vehicle():
 
 def test_a_reversed_geared_servo_by_hand():
     """Gear 2, direction -1, zero 1000: half a turn of the servo, 2048 counts, is -90 deg."""
-    servo = read(direction=-1, zero=1000, gear=2.0, torque_scale=0.9).servos[0]
+    servo = read(direction=-1, zero=1000, gear=2.0, torque_scale=0.9, range_deg=[-95, 80]).servos[0]
     assert servo.angle(3048) == pytest.approx(-math.pi / 2)
     assert servo.counts(-math.pi / 2) == 3048
     assert servo.velocity(100) == pytest.approx(-100 * servo.table.velocity_unit / 2)
@@ -96,6 +96,11 @@ MISTAKES = [
     ({"id": 2}, "arm.servos: ids 2, 2: each servo needs its own"),
     ({"joint": "elbow"}, "arm.servos: joints elbow, alpha_2; the vehicle has alpha_1, alpha_2"),
     ({"gear": 0.0}, "arm.servos[0].gear: 0 is not above 0"),
+    (  # 220 deg of the joint
+        {"gear": 1.8},
+        "gear: 1.8 makes the joint's 220 deg 1.1 turns of the servo; less than one is "
+        "possible: below 1.64, or a narrower range_deg",
+    ),
     ({"zero": None}, "arm.servos[0].zero is missing"),
     ({"coulomb": -0.1}, "arm.servos[0].coulomb: -0.1 is below 0"),
     ({"current_limit": 100.0}, "arm.servos[0].current_limit: 100 A is beyond the register"),

@@ -53,6 +53,13 @@ from uam_sim_bridge.faults import FaultError
         ({"vehicle_changes": {"air.wind": "x"}}, "air.wind: a list of 3 numbers expected, got 'x'"),
         ({"vehicle_changes": {"air.wind": [1, 2, np.nan]}}, "air.wind: a list of 3 numbers"),
         ({"vehicle_changes": {"air.gust": [1.0]}}, "air.gust: a number expected, got [1.0]"),
+        (
+            {"vehicle_changes": {"rotors.moment_ratio": 0.02}},
+            "rotors.moment_ratio: the plant does not read it, give a vehicle file; it reads "
+            "rotors.thrust_coefficient, ",
+        ),
+        ({"vehicle_changes": {"mass": 3.0}}, "mass: the plant does not read it, give a vehicle"),
+        ({"vehicle_changes": {"rotors": {}}}, "rotors: one of its entries, layout, radius, "),
         ({"vehicle_changes": {"air.gust": -1.0}}, "vehicle_changes: air.gust: -1 is below 0"),
     ],
 )

@@ -69,6 +69,17 @@ def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     raise ConfigurationError(f"unknown {kind} '{name}'; there are: {known}, or give a file")
 
 
+def beside(file: Path, folder: str, name: str) -> str:
+    """Return the name of config/<folder>, or file relative to the folder of `file`, in `file`.
+
+    Raises ConfigurationError for a file that does not exist there.
+    """
+    near = file.parent / Path(name).expanduser()
+    if near.is_file() or near.suffix.lower() in SUFFIXES or len(Path(name).parts) > 1:
+        return str(named(folder, str(near.absolute())))
+    return name
+
+
 def names(folder: str, suffixes: tuple[str, ...] = SUFFIXES) -> list[str]:
     """Return the names that `named` accepts for config/<folder>, sorted."""
     return sorted(p.stem for p in (root() / folder).glob("*") if p.suffix in suffixes)

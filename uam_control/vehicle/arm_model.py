@@ -20,6 +20,10 @@ FACE = "magnet_face"  # its site, where the payload hangs
 STRAIGHT = 1e-3  # [m] and [1] by which a planar arm may differ
 
 
+class UnreadableModel(VehicleError):
+    """An MJCF file that is missing, no XML, or has no numbers where numbers belong."""
+
+
 @dataclass(frozen=True)
 class Link:
     """One link of the arm, in the frame of its joint.
@@ -49,8 +53,21 @@ class ArmModel:
 
     @classmethod
     def of(cls, vehicle: VehicleDescription) -> ArmModel:
-        """Read the arm of a vehicle. Raises VehicleError if its MJCF has another form."""
-        return _Reader(vehicle).arm()
+        """Read the arm of a vehicle.
+
+        Raises VehicleError if its MJCF has another form, UnreadableModel if it has none.
+        """
+        try:
+            return _Reader(vehicle).arm()
+        except VehicleError:
+            raise
+        except FileNotFoundError as error:
+            text = f"{error.filename} does not exist, which it includes"
+        except (ElementTree.ParseError, OSError, ValueError, TypeError) as error:
+            text = str(error)
+        except RecursionError:
+            text = "it includes itself"
+        raise UnreadableModel(f"{vehicle.model}: {text}")
 
     def planar(self, gravity: float) -> dict[str, Any]:
         """Return the parameters of `ArmLoadParameters`; {} for an arm that is not planar.
@@ -162,10 +179,7 @@ class _Reader:
 
     def __init__(self, vehicle: VehicleDescription) -> None:
         self._file, self._names = vehicle.model, vehicle.joint_names
-        try:
-            self._root = _included(vehicle.model, vehicle.model.parent)
-        except (ElementTree.ParseError, OSError) as error:
-            raise VehicleError(f"{vehicle.model}: {error}") from None
+        self._root = _included(vehicle.model, vehicle.model.parent)
         self._classes = {
             (one.get("class"), part.tag): part.attrib
             for one in self._root.iter("default")

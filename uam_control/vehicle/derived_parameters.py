@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from uam_control.vehicle.arm_model import ArmModel
+from uam_control.vehicle.arm_model import ArmModel, UnreadableModel
 from uam_control.vehicle.description import AXES, VehicleDescription
 from uam_control.vehicle.loading import VehicleError
 
@@ -55,6 +55,8 @@ def _load(vehicle: VehicleDescription) -> dict[str, Any]:
     """Return the parameters of the arm's load; {} for an arm that is not planar."""
     try:
         arm = ArmModel.of(vehicle)
+    except UnreadableModel:
+        raise
     except VehicleError:
         return {}
     return arm.planar(vehicle.gravity)

@@ -61,9 +61,12 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         arm=_arm(top, len(top.entries("joints"))),
-        profiles={law: profiles.text(law) for law in profiles.values},
+        profiles={
+            law: configuration.beside(file, "profiles", profiles.text(law))
+            for law in profiles.values
+        },
         autopilot=top.text("autopilot"),
-        autopilot_gains=_autopilot_gains(top),
+        autopilot_gains=_autopilot_gains(top, file),
         numbers=document,
     )
     _check_names(described)
@@ -81,9 +84,10 @@ def _control_period(top: Section) -> float:
     return period
 
 
-def _autopilot_gains(top: Section) -> dict[str, float]:
+def _autopilot_gains(top: Section, described_in: Path) -> dict[str, float]:
     """Return the content of the file in config/autopilot; it must not repeat the rotor geometry."""
-    file = configuration.named("autopilot", top.text("autopilot"))
+    given = configuration.beside(described_in, "autopilot", top.text("autopilot"))
+    file = configuration.named("autopilot", given)
     gains = read_section(file, VehicleError)
     for name in gains.values:
         if str(name).startswith("CA_") or name in ("THR_MDL_FAC", "MPC_THR_HOVER"):

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from uam_control.settings.section import Section
 
+# entries that only the description and what is made of it read; a change of them has no effect
+NOT_OF_THE_PLANT = (
+    *("model", "profiles", "autopilot", "control_period", "mass", "gravity", "joints", "arm"),
+    *("rotors.layout", "rotors.radius", "rotors.moment_ratio", "servos.effort_limit"),
+)
+
 
 def check_plant_numbers(top: Section) -> None:
     """Raise the section's error if a number of air, sensors, variation or magnet is not usable."""

@@ -141,7 +141,7 @@ def read(
     logs = folder / "logs"
     measured = {file.stem: read_tick_times(file) for file in (logs / TICK_TIMES).glob("*.npz")}
     way, inside = PATHS[layout]
-    plant: dict[str, Any] = json.loads((logs / "mujoco_sim.json").read_text())
+    plant: dict[str, Any] = json.loads((logs / "mujoco_sim.json").read_text(encoding="utf-8"))
     return Budget(
         layout=layout,
         clock=clock,

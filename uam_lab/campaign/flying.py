@@ -30,7 +30,7 @@ def scenario_text(name_or_file: str) -> str:
 
     Raises ConfigurationError.
     """
-    return configuration.named("scenarios", name_or_file).read_text()
+    return configuration.named("scenarios", name_or_file).read_text(encoding="utf-8")
 
 
 def fly_all(

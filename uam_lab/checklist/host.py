@@ -60,7 +60,7 @@ def governors(folder: Path = GOVERNORS) -> tuple[str, ...]:
     found = []
     for file in sorted(folder.glob("cpu[0-9]*/cpufreq/scaling_governor")):
         try:
-            found.append(file.read_text().strip())
+            found.append(file.read_text(encoding="utf-8").strip())
         except OSError:  # a core that is switched off
             continue
     return tuple(found)

@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
     finally:
         driver.stop()
     text = pasted(options.joint, driver.chain.servos[joint].torque_scale, fit)
-    (out / "identification.yaml").write_text(text)
+    (out / "identification.yaml").write_text(text, encoding="utf-8")
     columns = (record.times, record.position[:, joint], record.effort[:, joint], loads)
     head = "time_s,angle_rad,effort_nm,weight_nm"
     np.savetxt(out / "samples.csv", np.column_stack(columns), "%.6f", ",", header=head, comments="")

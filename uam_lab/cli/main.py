@@ -17,11 +17,15 @@ from uam_lab.flight.ros import FORKER
 from uam_lab.processes import child, middleware
 from uam_lab.processes.interrupts import INTERRUPTED
 
+UTF_8 = "PYTHONUTF8"  # variable of Python
 WITHOUT_NODES = {"-h", "--help", "direct", "--engine=direct"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
+    if arguments is None:
+        _begin_in_utf_8()
+    os.environ["MPLBACKEND"] = "agg"  # figures are files; a notebook's backend may be missing here
     given = sys.argv[1:] if arguments is None else arguments
     with _ended_by_interrupt():
         with_nodes = given[:1] == ["fly"] and not WITHOUT_NODES.intersection(given)
@@ -31,6 +35,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         options = parsed(given)
     return run(options)
+
+
+def _begin_in_utf_8() -> None:
+    """Begin this program again in Python's UTF-8 mode where the locale has another encoding.
+
+    File names, reports and the terminal's text do not depend on the locale then.
+    """
+    if sys.getfilesystemencoding() != "utf-8" and os.environ.get(UTF_8) != "1":
+        os.environ[UTF_8] = "1"
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 
 @contextlib.contextmanager

@@ -78,12 +78,12 @@ def run(options: argparse.Namespace) -> int:
     if profile.section("mavlink_bridge").get("setpoint", "rates") != "rates":
         raise SettingsError(f"{profile.name}: margins need body-rate setpoints, setpoint: rates")
     payloads = options.payload or [0.0, 0.2]
-    mass = load_scenario(options.scenario, described).payload_mass
     series = series_of(options.flight) if options.flight and not options.initial else None
     out = make_folder(options.out, "margins")  # before the flight, which takes long
     flown = None
     if not options.initial:
         if series is None:
+            mass = load_scenario(options.scenario, described).payload_mass
             series = gains.fly(profile, vehicle, options.scenario, mass)
         flown = gains.flown_gains(profile, series)
     ticks = round(1e-3 * options.delay / described.control_period)

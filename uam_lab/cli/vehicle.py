@@ -85,7 +85,7 @@ def unit(lab: Path, folder: Path) -> str:
     command = f"{Path(sys.argv[0]).absolute()} vehicle --config {shlex.quote(str(lab.absolute()))}"
     return (
         configuration.path(UNIT)
-        .read_text()
+        .read_text(encoding="utf-8")
         .replace("@USER@", getpass.getuser())
         .replace("@FOLDER@", str(folder))
         .replace("@COMMAND@", command)

@@ -45,7 +45,7 @@ def budgets(rows: Sequence[plan.ComparedController]) -> dict[str, str]:
     for row in rows:
         if not row.profile.file.is_file():
             continue
-        lines = row.profile.file.read_text().splitlines()
+        lines = row.profile.file.read_text(encoding="utf-8").splitlines()
         head = []
         for line in lines:
             if not line.startswith("#"):

@@ -42,6 +42,7 @@ class CheckProcess:
             text=True,
             errors="replace",
             process_group=0,  # Ctrl-C reaches only the parent, which ends the child
+            encoding="utf-8",
         )
 
     def wait(self, seconds: float) -> Said:

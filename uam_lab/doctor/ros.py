@@ -118,7 +118,7 @@ def round_trip(said: Said, domain: int) -> Finding:
 def room(file: Path = RECEIVE_LIMIT) -> Finding:
     """Check the system's limit of a socket's receive buffer."""
     try:
-        limit = int(file.read_text())
+        limit = int(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return ok("buffers", f"limit unknown: {file} is not readable")
     found = f"net.core.rmem_max is {limit // 1024} KiB"

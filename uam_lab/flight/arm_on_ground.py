@@ -12,20 +12,23 @@ from uam_control.mission.motion.trajectory import reference_rows
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_sim_bridge.plant.arm_geometry import room_below
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 SINKS = 0.005  # [m] by which an arm may reach below the feet: a gear and a floor give way
 
 
-def check(vehicle: VehicleDescription, scenario: Scenario) -> None:
+def check(vehicle: VehicleDescription, scenario: Scenario, plant: str = DEFAULT_PLANT) -> None:
     """Raise VehicleError or ScenarioError if the arm reaches through the ground.
 
     Checked are the stowed arm, that of the take-off and that of the landing. An MJCF that does not
-    compile is not judged here: the plant names what is wrong with it.
+    compile is refused, too; a plant that is not MuJoCo's may accept it.
     """
     try:
         model = Vehicle.of(vehicle).compile(0.0)
     except VehicleError:
+        if plant == DEFAULT_PLANT:
+            raise
         return
     start = standing(scenario.arm_start)
     flown = scenario.begun_at(start)

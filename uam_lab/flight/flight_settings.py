@@ -318,7 +318,7 @@ def settings(
         )
     else:
         feasible.check(loaded)
-    arm_on_ground.check(described, loaded)
+    arm_on_ground.check(described, loaded, plant)
     injected = read_schedule(faults, loaded, seed)
     acting = presets.read(plant_preset, effects)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings.section import Section
-from uam_control.vehicle.plant_numbers import check_plant_numbers
+from uam_control.vehicle.plant_numbers import NOT_OF_THE_PLANT, check_plant_numbers
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.results.metrics import plain
 
@@ -63,6 +63,7 @@ def vehicle_changes(given: Any, numbers: Mapping[str, Any]) -> dict[str, Any]:
         found[name] = value if name == EFFECTS else plain(value)
         if name != EFFECTS:
             entry, last = _place(name, changed)
+            _check_read(str(name), changed)
             _check_alike(name, value, entry[last])
             entry[last] = found[name]
     if found.keys() - {EFFECTS}:
@@ -84,6 +85,17 @@ def _place(name: Any, numbers: dict[str, Any]) -> tuple[dict[str, Any], str]:
     return entry, keys[-1]
 
 
+def _check_read(name: str, numbers: dict[str, Any]) -> None:
+    """Raise SettingsError for an entry that the plant does not read."""
+    if any(f"{name}.".startswith(f"{entry}.") for entry in NOT_OF_THE_PLANT):
+        top, dot, _ = name.partition(".")
+        beside = [f"{top}.{key}" for key in numbers[top]] if dot else list(numbers)
+        read = ", ".join(one for one in beside if one not in NOT_OF_THE_PLANT)
+        raise SettingsError(
+            f"{WHERE} {name}: the plant does not read it, give a vehicle file; it reads {read}"
+        )
+
+
 def _check_alike(name: str, value: Any, before: Any) -> None:
     """Raise SettingsError if a value is of another type or length than the one it replaces."""
     expected = ""
@@ -98,7 +110,7 @@ def _check_alike(name: str, value: Any, before: Any) -> None:
             "" if fits and all(map(_is_number, values)) else f"a list of {len(before)} numbers"
         )
     elif isinstance(before, dict):
-        expected = "" if isinstance(value, Mapping) else f"one of its entries: {', '.join(before)}"
+        expected = f"one of its entries, {', '.join(before)},"
     if expected:
         raise SettingsError(f"{WHERE} {name}: {expected} expected, got {value!r}")
 

@@ -124,7 +124,7 @@ def _open(node: Node, options: RecorderParameters, rightful: RightfulNodes) -> T
     file = Path(options.file).expanduser() if options.file else new_log_file(stamp)
     source = options.facts
     try:
-        facts = json.loads(Path(source).read_text()) if source else None
+        facts = json.loads(Path(source).read_text(encoding="utf-8")) if source else None
     except (OSError, ValueError) as error:
         raise ParameterError(f"facts: {source} cannot be read: {error}") from None
     try:
@@ -158,7 +158,7 @@ def _complete(node: Node, recording: TopicRecorder, statistics: str) -> None:
     if statistics:
         summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
         try:
-            Path(statistics).write_text(json.dumps(summary, indent=1))
+            Path(statistics).write_text(json.dumps(summary, indent=1), encoding="utf-8")
         except OSError as error:
             log.error(f"{statistics} cannot be written: {error.strerror}")
 

@@ -25,7 +25,7 @@ _ptrace.restype = ctypes.c_long
 def refusal() -> str:
     """Return why threads of children cannot be stopped on this machine, "" if they can."""
     try:
-        scope = int(SCOPE.read_text())
+        scope = int(SCOPE.read_text(encoding="utf-8"))
     except (OSError, ValueError):  # a kernel without Yama
         return ""
     if scope >= ADMINISTRATOR_ONLY and os.geteuid() != 0:
@@ -44,7 +44,7 @@ class StoppedThreads:
         self._stopped: list[int] = []
         for task in Path(f"/proc/{pid}/task").iterdir():
             with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
-                if chosen((task / "comm").read_text().strip()):
+                if chosen((task / "comm").read_text(encoding="utf-8").strip()):
                     self._stop(int(task.name))
 
     def _stop(self, thread: int) -> None:

@@ -41,7 +41,7 @@ def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str
     source = configuration.named("scenarios", scenario)
     records: Records = {
         FLIGHT: {name: json.dumps(value) for name, value in info.items()},
-        SCENARIO: {"name": source.name, "text": source.read_text()},
+        SCENARIO: {"name": source.name, "text": source.read_text(encoding="utf-8")},
         TEXTS: dict(texts),
     }
     write_json(file, records)
@@ -64,6 +64,6 @@ def _scenario(record: Mapping[str, str] | None, info: Mapping[str, Any]) -> Scen
         return None
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / Path(record["name"]).name
-        file.write_text(record["text"])
+        file.write_text(record["text"], encoding="utf-8")
         vehicle = load_description(info.get("vehicle") or DEFAULT_VEHICLE)
         return load_scenario(str(file), vehicle, options_of(info))

@@ -29,7 +29,7 @@ class DefinitionMissing(LookupError):
 def definition(type_name: str) -> str:
     """Return the .msg text of `package/msg/Name`. Raises DefinitionMissing."""
     own = _own(type_name)
-    return tf_message.DEFINITION if own else _file(type_name, "msg").read_text()
+    return tf_message.DEFINITION if own else _file(type_name, "msg").read_text(encoding="utf-8")
 
 
 @cache
@@ -40,7 +40,7 @@ def type_hash(type_name: str) -> str:
     """
     if _own(type_name):
         return f"RIHS01_{tf_message.HASH.hex()}"
-    hashes = json.loads(_file(type_name, "json").read_text())["type_hashes"]
+    hashes = json.loads(_file(type_name, "json").read_text(encoding="utf-8"))["type_hashes"]
     return next(one["hash_string"] for one in hashes if one["type_name"] == type_name)
 
 

@@ -13,7 +13,7 @@ LABORATORY_FILE = "laboratory.json"
 def statistics(file: Path) -> dict[str, Any]:
     """Return what a node wrote at its end, {} without it."""
     try:
-        return json.loads(file.read_text())
+        return json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 

@@ -128,7 +128,7 @@ def median(numbers: list[float]) -> float:
 def saved(folder: Path) -> dict[str, Any]:
     """Return the figures in a result folder, {} without them."""
     try:
-        return json.loads((folder / NAME).read_text())
+        return json.loads((folder / NAME).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 

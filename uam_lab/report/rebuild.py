@@ -112,12 +112,12 @@ def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) 
     if name in texts:
         write_text(out / name, texts[name])
     elif (directory / name).exists():
-        write_text(out / name, (directory / name).read_text())
+        write_text(out / name, (directory / name).read_text(encoding="utf-8"))
 
 
 def _json(file: Path) -> dict[str, Any]:
     """Return the content of a JSON file, {} if it is missing or broken."""
     try:
-        return json.loads(file.read_text())
+        return json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}

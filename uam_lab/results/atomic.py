@@ -36,7 +36,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_rows(path: Path, head: Iterable[object], rows: Iterable[Iterable[object]]) -> None:
     """Write a CSV table atomically."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as out:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(head)
         writer.writerows(rows)

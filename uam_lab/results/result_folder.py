@@ -118,7 +118,7 @@ def write_json(path: Path, value: Any) -> None:
 def read_json(file: Path) -> dict[str, Any]:
     """Return the content of a JSON file, a mapping. Raises ResultFolderError, OSError."""
     try:
-        found = json.loads(file.read_text())
+        found = json.loads(file.read_text(encoding="utf-8"))
     except ValueError:
         raise ResultFolderError(f"{file}: not valid JSON") from None
     if not isinstance(found, dict):
@@ -155,7 +155,9 @@ def git_commit(directory: Path | None = None) -> str | None:
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(directory), *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=5, check=True, encoding="utf-8"
+        )
         return done.stdout.strip()
 
     try:

@@ -67,7 +67,7 @@ def scenario_file(study: Study, condition: Condition, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     name = "".join(c if c.isalnum() else "_" for c in condition.label)
     file = folder / f"{name}.yaml"
-    file.write_text(yaml.safe_dump(study.scenario(condition), sort_keys=False))
+    file.write_text(yaml.safe_dump(study.scenario(condition), sort_keys=False), encoding="utf-8")
     return file
 
 

@@ -57,7 +57,7 @@ TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit", FLIGH
 
 def template() -> str:
     """Return the commented template of a lab file."""
-    return lab_path(TEMPLATE).read_text()
+    return lab_path(TEMPLATE).read_text(encoding="utf-8")
 
 
 def lab_path(name_or_file: str | Path) -> Path:

@@ -55,7 +55,7 @@ def ignore_own_endpoints() -> Iterator[None]:
     """
     before = os.environ.get(PROFILES_FILE)
     try:
-        text = with_property(Path(before).read_text() if before else EMPTY)
+        text = with_property(Path(before).read_text(encoding="utf-8") if before else EMPTY)
     except (OSError, ElementTree.ParseError):
         yield
         return

@@ -77,7 +77,7 @@ def try_out(options: ProcessParameters) -> None:
     if options == ProcessParameters():
         return
     command = [sys.executable, "-m", __name__, json.dumps(options.to_mapping())]
-    tried = subprocess.run(command, capture_output=True, text=True, check=False)
+    tried = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8")
     if tried.returncode:
         said = (tried.stderr or tried.stdout).strip().splitlines()
         raise ParameterError(said[-1] if said else f"exit status {tried.returncode}")

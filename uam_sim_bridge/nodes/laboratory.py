@@ -117,7 +117,7 @@ class Rehearsal:
         self._mission = MissionStatus()
         self._person = Person(vehicle.joint_names, self.lab.folded)
         self._list, self._asked = ChecklistState(), -math.inf
-        (folder / READY).write_text(f"{self.lab.mocap.port}\n")
+        (folder / READY).write_text(f"{self.lab.mocap.port}\n", encoding="utf-8")
 
     def await_autopilot(self) -> None:
         """Wait until the autopilot is connected, or a signal."""
@@ -249,7 +249,9 @@ def main() -> int:
     finally:
         if rehearsal is not None:
             if parameters.statistics:
-                Path(parameters.statistics).write_text(json.dumps(rehearsal.report()))
+                Path(parameters.statistics).write_text(
+                    json.dumps(rehearsal.report()), encoding="utf-8"
+                )
             rehearsal.close()
         node.destroy_node()
         rclpy.try_shutdown()

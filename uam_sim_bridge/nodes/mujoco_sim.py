@@ -517,7 +517,9 @@ def main() -> int:
         if simulator is not None:
             simulator.close()
             if statistics := options.parameters.statistics:
-                Path(statistics).write_text(json.dumps(simulator.report().to_mapping()))
+                Path(statistics).write_text(
+                    json.dumps(simulator.report().to_mapping()), encoding="utf-8"
+                )
         node.destroy_node()
         rclpy.try_shutdown()
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import mujoco
 import numpy as np
@@ -25,6 +25,7 @@ from uam_control.vehicle import (
 )
 from uam_sim_bridge.plant.arm_geometry import BASE, SWING, measured_arm
 
+T = TypeVar("T")
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 PAYLOAD, MAGNET = "payload", "magnet"  # bodies of the MJCF
 MASS_TOLERANCE = 1e-3  # relative
@@ -75,10 +76,7 @@ class Vehicle:
         contradicts the description.
         """
         described = self.description
-        try:
-            spec = mujoco.MjSpec.from_file(str(described.model))
-        except ValueError as error:
-            raise VehicleError(f"{described.model}: {str(error).splitlines()[0]}") from None
+        spec = self._of_mujoco(lambda: mujoco.MjSpec.from_file(str(described.model)))
         self._check_parts(spec)
         spec.option.gravity = (0.0, 0.0, -described.gravity)
         self._add_rotors(spec)
@@ -88,11 +86,19 @@ class Vehicle:
         spec.geom(PAYLOAD).mass = max(payload_mass, 1e-3)
         if extend is not None:
             extend(spec)
-        model = spec.compile()
+        model = self._of_mujoco(spec.compile)
         if extend is None:  # added parts may have a mass
             self._check_model(model)
         self._vary(model)
         return model
+
+    def _of_mujoco(self, make: Callable[[], T]) -> T:
+        """Return what MuJoCo makes; raise VehicleError in one line: the MJCF, MuJoCo's reason."""
+        try:
+            return make()
+        except ValueError as error:
+            reason = " ".join(str(error).removeprefix("Error: ").split())
+            raise VehicleError(f"{self.description.model}: {reason}") from None
 
     def _check_parts(self, spec: mujoco.MjSpec) -> None:
         """Raise VehicleError if a part that the plant finds by name is not in the MJCF."""

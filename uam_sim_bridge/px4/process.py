@@ -40,7 +40,7 @@ class Px4Process:
         own = folder / "scripts"
         own.mkdir()
         for name, text in scripts.items():
-            (own / name).write_text(text)
+            (own / name).write_text(text, encoding="utf-8")
         surroundings["PATH"] = os.pathsep.join((str(own), surroundings.get("PATH", os.defpath)))
         # files that PX4 makes outside its working directory, and leaves if it is killed
         self._files = [Path(f"/tmp/{name}-{instance}") for name in ("px4-sock", "px4_lock")]

@@ -52,7 +52,9 @@ class Px4Installation:
     def ranges(self) -> dict[str, Range]:
         """Return type and limits of each parameter of the build; {} if it does not list them."""
         try:
-            listed = json.loads((self.directory / _LISTED).read_text())["parameters"]
+            listed = json.loads((self.directory / _LISTED).read_text(encoding="utf-8"))[
+                "parameters"
+            ]
         except (OSError, ValueError, KeyError):
             return {}
         return {
@@ -68,7 +70,7 @@ class Px4Installation:
         A build that does not tell passes.
         """
         try:
-            own = _OWN_CLOCK in (self.directory / _BOARD).read_text()
+            own = _OWN_CLOCK in (self.directory / _BOARD).read_text(encoding="utf-8")
         except OSError:
             return
         if not own:

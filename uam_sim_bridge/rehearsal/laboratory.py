@@ -199,7 +199,7 @@ class Laboratory:
             value = self.hil.controls[first + d.magnet_output - 1]
             return bool(abs(value - d.magnet_on) < abs(value - d.magnet_off))
         try:
-            level = line.read_text() == "1"
+            level = line.read_text(encoding="utf-8") == "1"
         except OSError:
             return False
         inverted = any(one.fault.NAME == "magnet_inverted" for one in self.wiring.faults)

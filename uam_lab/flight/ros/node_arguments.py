@@ -185,7 +185,7 @@ def _px4_parameters(settings: FlightSettings, folder: ResultFolder) -> dict[str,
         settings.vehicle, None, settings.px4_params, None if own is None else own.ranges()
     )
     file = folder.path / "logs" / REQUIRED
-    file.write_text(px4_parameters.required(values, in_the_loop(settings)))
+    file.write_text(px4_parameters.required(values, in_the_loop(settings)), encoding="utf-8")
     return {"required_parameters": str(file.absolute()), "set_parameters": own is not None}
 
 
@@ -202,7 +202,7 @@ def write(
     parameters, versions."""
     folder.write_parameters(sections)
     texts = {
-        folder.parameters.name: folder.parameters.read_text(),
+        folder.parameters.name: folder.parameters.read_text(encoding="utf-8"),
         folder.versions.name: as_json(versions()),
     }
     known = settings_facts(settings)
@@ -323,7 +323,7 @@ def autopilot(
         return "", []
     if changed:
         file = folder.path / "logs" / GAINS
-        file.write_text(yaml.safe_dump(changed))
+        file.write_text(yaml.safe_dump(changed), encoding="utf-8")
         vehicle += ["--params", str(file.absolute())]
     return STAND_IN, [*instance, *patience, *vehicle, "--once"]
 

@@ -74,6 +74,7 @@ class Rendering:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
+            encoding="utf-8",
         )
 
     def result(self, progress: Callable[[str], None] = lambda text: None) -> Rendered:

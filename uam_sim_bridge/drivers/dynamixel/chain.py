@@ -202,6 +202,13 @@ def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDe
             inside = f"{math.degrees(low):g} to {math.degrees(high):g}"
             raise entry.error("range_deg", f"not an interval within the vehicle's {inside}")
         low, high = own
+    turns = gear * (high - low) / (2.0 * math.pi)
+    if turns >= 1.0:  # after a start a servo reports its position within one turn
+        raise entry.error(
+            "gear",
+            f"{gear:g} makes the joint's {math.degrees(high - low):g} deg {turns:.3g} turns of the "
+            f"servo; less than one is possible: below {gear / turns:.3g}, or a narrower range_deg",
+        )
     friction = [entry.number(name) for name in ("coulomb", "viscous")]
     for name, value in zip(("coulomb", "viscous"), friction, strict=True):
         if value < 0.0:

@@ -112,7 +112,7 @@ def folder() -> Path:
 def model_numbers() -> dict[str, int]:
     """Return model → model number, for example xm430_w210 → 1030."""
     numbers = {}
-    for line in (folder() / "dynamixel.model").read_text().splitlines()[1:]:
+    for line in (folder() / "dynamixel.model").read_text(encoding="utf-8").splitlines()[1:]:
         number, _, file = line.strip().partition("\t")
         if file:
             numbers[file.removesuffix(".model")] = int(number)
@@ -134,7 +134,7 @@ def control_table(model: str) -> ControlTable:
     file = folder() / f"{model}.model"
     if not file.is_file():
         raise ControlTableError(f"the installed dynamixel-sdk has no control table of {model}")
-    sections = _sections(file.read_text())
+    sections = _sections(file.read_text(encoding="utf-8"))
     registers: dict[str, Register] = {}
     for address, size, name in sections["control table"]:
         registers.setdefault(name, Register(int(address), int(size)))

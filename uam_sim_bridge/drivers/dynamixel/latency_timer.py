@@ -11,7 +11,7 @@ def latency_timer(device: str, sysfs: Path = SYSFS) -> float | None:
     """Return the latency timer [s] of a serial device; None for an adapter without one."""
     file = sysfs / Path(device).resolve().name / "latency_timer"
     try:
-        return 1e-3 * int(file.read_text())
+        return 1e-3 * int(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
 

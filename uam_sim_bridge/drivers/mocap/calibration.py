@@ -134,4 +134,4 @@ def text(calibration: Calibration) -> str:
 
 def write(calibration: Calibration, file: Path) -> None:
     """Write the calibration file; raises OSError."""
-    file.write_text(text(calibration))
+    file.write_text(text(calibration), encoding="utf-8")

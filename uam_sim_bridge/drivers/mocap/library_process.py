@@ -17,7 +17,7 @@ def main() -> int:
 
     system, options = sys.argv[1:3]
     # the library prints on standard output itself
-    lines = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
+    lines = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1, encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     try:
         connection = motioncapture.connect(system, json.loads(options))

@@ -18,7 +18,7 @@ COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")  # s, m
 
 def write(file: Path, poses: Sequence[TimedPose]) -> None:
     """Write the poses; raises OSError."""
-    with file.open("w", newline="") as out:
+    with file.open("w", newline="", encoding="utf-8") as out:
         rows = csv.writer(out)
         rows.writerow(COLUMNS)
         for time, (position, quaternion) in poses:

@@ -24,7 +24,7 @@ class FileLine:
 
     def read(self) -> bool:
         """Return the state; raises OSError if the file is gone."""
-        return (self._file.read_text() == "1") is not self._active_low
+        return (self._file.read_text(encoding="utf-8") == "1") is not self._active_low
 
     def close(self) -> None:
         """Nothing to give back: the level stays."""
@@ -32,5 +32,5 @@ class FileLine:
     def _level(self, on: bool) -> None:
         """Write the level in one step: a reader never sees an empty file."""
         fresh = self._file.with_name(self._file.name + ".new")
-        fresh.write_text("1" if on is not self._active_low else "0")
+        fresh.write_text("1" if on is not self._active_low else "0", encoding="utf-8")
         os.replace(fresh, self._file)
