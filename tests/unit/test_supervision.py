@@ -289,12 +289,30 @@ def test_a_hold_that_waits_is_ended_by_a_command_or_becomes_a_landing():
 def test_a_limit_that_comes_back_again_and_again_lands():
     far, near = with_state((0, 0), 1.2), observation()
     supervisor, stamp = flying(resumes_allowed=2.0), 1.0
-    for _ in range(3):
+    for _ in range(2):
         assert watch(supervisor, far, 0.6, stamp).state is State.HOLDING
-        decision = watch(supervisor, near, 2.0, stamp + 0.7)
+        assert watch(supervisor, near, 2.0, stamp + 0.7).state is State.FLYING
         stamp += 4.0
+    decision = watch(supervisor, far, 0.6, stamp)
     assert decision.state is State.LANDING
-    assert decision.cause == "position error 1.20 m exceeds 1 m; clear again, after 2 resumes"
+    assert decision.cause == "position error 1.20 m exceeds 1 m, again after 2 resumes"
+    assert supervisor.changes[-1].event is Event.EXCEEDED_AGAIN
+
+
+def test_each_quantity_has_its_own_resumes():
+    old, near = observation(readings=Readings(mocap_age=0.5)), observation()
+    far = with_state((0, 0), 1.2)
+    supervisor, stamp = flying(resumes_allowed=1.0), 1.0
+    for seen, state in ((far, State.FLYING), (old, State.FLYING), (old, State.LANDING)):
+        watch(supervisor, seen, 0.6, stamp)
+        assert watch(supervisor, near, 2.0, stamp + 0.7).state is state
+        stamp += 4.0
+
+
+def test_without_a_resume_allowed_it_lands_once_the_limit_is_clear():
+    supervisor = flying(resumes_allowed=0.0)
+    assert watch(supervisor, with_state((0, 0), 1.2), 0.6, 1.0).state is State.HOLDING
+    assert watch(supervisor, observation(), 2.0, 1.7).state is State.LANDING
 
 
 def test_after_a_goal_a_cleared_limit_waits():

@@ -1,13 +1,15 @@
 """Rules for the end of a hold without a command.
 
 A hold beyond its limit becomes a landing after hold_timeout. After the limit is clear, when_clear
-decides (after_restart for a lost controller). Every other hold waits for a command, and lands after
-wait_timeout, or after command_timeout if a command or a reached goal started it.
+decides (after_restart for a lost controller). A quantity whose limit has been clear so
+`resumes_allowed` times lands when it is exceeded again. Every other hold waits for a command, and
+lands after wait_timeout, or after command_timeout if a command or a reached goal started it.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 
 from uam_control.supervision.checks import CONTROLLERS
@@ -26,7 +28,7 @@ class Holds:
         self._beyond_since: float | None = None  # stamp [s] from which a limit is exceeded
         self._quantity = ""  # name of the quantity whose limit started the hold
         self._event = Event.HOLD
-        self._resumes = 0
+        self._resumes: Counter[str] = Counter()  # quantity → holds that ended in CLEAR
 
     def begin(self, stamp: float, event: Event, quantity: str) -> None:
         """Begin a hold at `stamp` [s]; quantity: name of the quantity beyond its limit, or ""."""
@@ -36,7 +38,15 @@ class Holds:
     def end(self, event: Event) -> None:
         """End the hold."""
         self._since, self._beyond_since = math.inf, None
-        self._resumes += event is Event.CLEAR
+        self._resumes[self._quantity] += event is Event.CLEAR
+
+    def again(
+        self, quantity: str, cause: str, p: SupervisionParameters
+    ) -> Iterator[tuple[Event, str]]:
+        """Yield a landing if `quantity`, whose hold limit is exceeded, has had all its resumes."""
+        resumes = self._resumes[quantity]
+        if 0 < resumes >= p.resumes_allowed:
+            yield Event.EXCEEDED_AGAIN, f"{cause}, again after {resumes} resumes"
 
     def events(
         self, stamp: float, level: Level, beyond: str, cause: str, p: SupervisionParameters
@@ -75,7 +85,7 @@ class Holds:
         elif p.when_clear == "land":
             yield Event.CLEAR_TO_LAND, f"{cause}; clear again"
         elif p.when_clear == "resume" and not off_path:
-            if self._resumes < p.resumes_allowed:
+            if p.resumes_allowed > self._resumes[self._quantity]:
                 yield Event.CLEAR, "clear again"
-            else:
-                yield Event.CLEAR_TO_LAND, f"{cause}; clear again, after {self._resumes} resumes"
+            else:  # none is allowed
+                yield Event.CLEAR_TO_LAND, f"{cause}; clear again"

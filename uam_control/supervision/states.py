@@ -39,6 +39,7 @@ class Event(Enum):
     LAND_LIMIT = "land limit exceeded"
     HARD_LIMIT = "failsafe limit exceeded"
     HARD_LIMIT_ON_GROUND = "failsafe limit exceeded on the ground"
+    EXCEEDED_AGAIN = "hold limit exceeded after resumes_allowed resumes"
     HELD_TOO_LONG = "limit exceeded for hold_timeout"
     WAITED_TOO_LONG = "no command in time"
     CLEAR = "limit clear, when_clear: resume"
@@ -91,6 +92,7 @@ TRANSITIONS = (
     Transition(_S.FLYING, _E.GOAL, _S.FLYING),
     Transition(_S.FLYING, _E.RESUME, _S.FLYING),
     Transition(_S.FLYING, _E.LAND_LIMIT, _S.LANDING),
+    Transition(_S.FLYING, _E.EXCEEDED_AGAIN, _S.LANDING),
     Transition(_S.FLYING, _E.MISSION_OVER, _S.LANDING),
     Transition(_S.FLYING, _E.LAND, _S.LANDING),
     Transition(_S.FLYING, _E.LANDING_DUE, _S.LANDING),

@@ -149,7 +149,11 @@ class Reactions(ParameterSet):
         ("resume", "land", "wait"),
     )
     resumes_allowed: float = number(
-        5.0, "holds in a flight after which when_clear resumes; the next one lands", "1", 0.0, 1e3
+        5.0,
+        "holds of one quantity that when_clear ends by a resume; the next one lands",
+        "1",
+        0.0,
+        1e3,
     )
     wait_timeout: float = number(
         30.0, "time of a hold without a command before a landing", "s", 1.0, 3600.0

@@ -255,6 +255,7 @@ class Supervisor:
             yield Event.NO_TOUCHDOWN, "no touchdown in time"
         yield from self._holds.events(self._stamp, level, cause, self.cause, p)
         if level is Level.HOLD:
+            yield from self._holds.again(finding.name, cause, p)
             yield Event.HOLD_LIMIT, cause
         if level is Level.FINE:
             yield from self._holds.clear(self.cause, seen.off_path, p)
