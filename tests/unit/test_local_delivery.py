@@ -18,7 +18,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
-from uam_msgs_py.node import local_delivery, wiring
+from uam_msgs_py.node import door, local_delivery, wiring
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.rightful import RightfulNodes
@@ -49,11 +49,7 @@ class FakeSubscription:
     raw: bool = True
     arrived: list = field(default_factory=list)
 
-    @property
-    def handle(self):
-        return self
-
-    def take_message(self, kind, raw):
+    def take_message(self):
         return (self.arrived.pop(0), {}) if self.arrived else None
 
     def get_publisher_count(self):
@@ -95,6 +91,7 @@ class FakeNode:
 def no_middleware(monkeypatch):
     monkeypatch.setattr(local_delivery, "LocalPublisher", lambda node, *_: f"guard of {node.name}")
     monkeypatch.setattr(local_delivery, "identity", lambda publisher: b"")
+    monkeypatch.setattr(door, "Taker", lambda subscription: subscription)
 
 
 def nodes(delivery, *names):

@@ -96,7 +96,7 @@ class Watch:
                 self._listen(topic)
             elif topic in self._subscriptions:
                 left_out = self._subscriptions.pop(topic)
-                self.door.guards.pop(left_out, None)
+                self.door.forget(left_out)
                 self._node.destroy_subscription(left_out)
 
     @property

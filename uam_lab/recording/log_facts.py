@@ -20,7 +20,7 @@ from typing import Any
 from uam_control.mission import Scenario, ScenarioOptions, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
-from uam_lab.recording.mcap_reader import read_metadata
+from uam_lab.recording.mcap_reader import UnreadableLog, read_metadata
 from uam_lab.results.result_folder import write_json
 
 FLIGHT, SCENARIO, TEXTS = "flight", "scenario", "files"
@@ -50,7 +50,10 @@ def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str
 def read(log: Path) -> LogFacts:
     """Read the metadata of a log; missing parts are empty. Raises UnreadableLog, OSError."""
     records = read_metadata(log)
-    info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
+    try:
+        info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
+    except (ValueError, RecursionError) as error:
+        raise UnreadableLog(f"{log}: the metadata '{FLIGHT}' is damaged: {error}") from None
     return LogFacts(info, _scenario(records.get(SCENARIO), info), records.get(TEXTS, {}))
 
 

@@ -21,7 +21,8 @@ from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
+from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, publishers
+from uam_msgs_py.node.taking import Taker
 
 LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
 NAMES_PERIOD = 1.0  # s of wall time between two looks at who publishes a topic
@@ -41,7 +42,9 @@ class Door:
         self.guards: dict[Subscription, SolePublisher] = {}
         self.refusals = Refusals()
         self._node, self._tells = node, tells
-        self._names: dict[str, tuple[float, str]] = {}  # topic → when looked, who publishes it
+        self._takers: dict[Subscription, Taker] = {}  # of the others
+        # topic → when looked [s], who publishes it: gid → node
+        self._names: dict[str, tuple[float, dict[bytes, str]]] = {}
         self._before: list[str] = []  # complaints at the last news
         self._logged: dict[str, float] = {}
 
@@ -59,14 +62,19 @@ class Door:
             )
         return subscription
 
+    def forget(self, subscription: Subscription) -> None:
+        """Take no more messages of a subscription that will be destroyed."""
+        self.guards.pop(subscription, None)
+        self._takers.pop(subscription, None)
+
     def taken(self, subscription: Subscription) -> Iterator[tuple[Any, dict[str, int]]]:
         """Take and yield the received messages and their times, oldest first.
 
         They are serialized if the subscription is raw.
         """
-        take = (self.guards.get(subscription) or subscription.handle).take_message
+        source = self.guards.get(subscription) or self._taker(subscription)
         kind, raw = subscription.msg_type, subscription.raw
-        while (found := take(kind, True)) is not None:
+        while (found := source.take_message()) is not None:
             if not raw:
                 try:
                     found = deserialized(found[0], kind), found[1]
@@ -102,7 +110,7 @@ class Door:
         """Count a message that cannot be used; the next news name topic and sender."""
         topic, guard = subscription.topic_name, self.guards.get(subscription)
         if guard is None:
-            sender = rightful = self._publishers(topic)
+            sender = rightful = self.sender(subscription)
         else:
             sender, rightful = guard.rightful, guard.publisher
         expected = isinstance(error, BadMessage)
@@ -135,11 +143,20 @@ class Door:
             "foreign publishers": "; ".join(complaints(self.guards.values())),
         }
 
-    def _publishers(self, topic: str) -> str:
-        """Return the nodes that publish a topic, looked up at most every NAMES_PERIOD."""
-        now = time.monotonic()
-        looked, names = self._names.get(topic, (-NAMES_PERIOD, ""))
-        if now - looked >= NAMES_PERIOD:
-            names = " or ".join(publishers(self._node, topic).values())
-            self._names[topic] = now, names
-        return names
+    def sender(self, subscription: Subscription) -> str:
+        """Return the node that sent the last message of a topic that several may publish.
+
+        Who publishes it is looked up at most every NAMES_PERIOD.
+        """
+        topic, gid = subscription.topic_name, bytes(self._taker(subscription).gid)
+        looked, names = self._names.get(topic, (-NAMES_PERIOD, {}))
+        if gid not in names and time.monotonic() - looked >= NAMES_PERIOD:
+            names = publishers(self._node, topic)
+            self._names[topic] = time.monotonic(), names
+        return names.get(gid, UNKNOWN)
+
+    def _taker(self, subscription: Subscription) -> Taker:
+        made = self._takers.get(subscription)
+        if made is None:
+            made = self._takers[subscription] = Taker(subscription)
+        return made

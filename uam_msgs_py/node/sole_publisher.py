@@ -76,12 +76,10 @@ class SolePublisher:
                 return data
         return None
 
-    def take_message(self, kind: type, raw: bool) -> tuple[bytes, dict[str, int]] | None:
-        """Return the next serialized message and its times, as rclpy's handle does for `raw`."""
+    def take_message(self) -> tuple[bytes, dict[str, int]] | None:
+        """Return the next message of the rightful publisher and its times; None without one."""
         data = self.take()
-        if data is None:
-            return None
-        return data, {"source_timestamp": self.taker.info.source_timestamp}
+        return None if data is None else (data, self.taker.times)
 
     @property
     def refused(self) -> dict[str, int]:

@@ -105,5 +105,15 @@ class Taker:
             return None
         return ctypes.string_at(self._data.buffer, self._data.length)
 
+    def take_message(self) -> tuple[bytes, dict[str, int]] | None:
+        """Return the next received message and its times; None without one."""
+        data = self.take()
+        return None if data is None else (data, self.times)
+
+    @property
+    def times(self) -> dict[str, int]:
+        """Times of the last message [ns], as of rclpy's handle."""
+        return {"source_timestamp": self.info.source_timestamp}
+
     def __del__(self):
         rcutils.rcutils_uint8_array_fini(ctypes.byref(self._data))

@@ -78,6 +78,16 @@ WIRES = (
 )
 
 
+def reporting(recorded: bool, foreign: Collection[str] = ()) -> list[str]:
+    """Return the nodes but the plant that a tick needs and that report in /diagnostics.
+
+    recorded: see `missing`; foreign: nodes of the stack that the user replaces.
+    """
+    nodes = dict.fromkeys(wire.publisher for wire in WIRES)
+    own = [one for one in nodes if one != PLANT and one not in foreign]
+    return [*own, RECORDER] if recorded else own
+
+
 def with_foreign(node: Node, foreign: Mapping[str, str]) -> Sequence[Wire]:
     """Return WIRES for a flight in which the user's own nodes replace others.
 

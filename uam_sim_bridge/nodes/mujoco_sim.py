@@ -57,12 +57,12 @@ from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import (
     SETPOINT,
-    SUSPECTS,
     Answers,
     RecorderProgress,
     Sensors,
     TruthTopics,
     nanoseconds,
+    suspected,
 )
 from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.paced_clock import PacedClock
@@ -75,7 +75,6 @@ RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"
 CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
-LONGEST = math.inf  # [s] of a wait without a limit
 SILENT = 10.0  # [s] longest wait for the motor commands of an autopilot that may be silent
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = SECOND  # [ns] receive buffers have room for more, see config/dds/fastdds.xml
@@ -124,7 +123,7 @@ class Simulator:
         self.connections = Connections(node)
         self.recorded = RecorderProgress(node, declared.rightful)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._any_input_wakes)
-        patience = options.answer_timeout or LONGEST
+        patience = self._limit = options.answer_timeout or math.inf  # [s] of a wait
         rotors = len(described.rotors)
         waits = HilParameters(answer_timeout=min(patience, SILENT))
         address = options.hil_address
@@ -144,7 +143,8 @@ class Simulator:
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._unanswered = 0  # ticks in a row without an answer
         self._patience = Patience(patience)
-        self._awaited = Awaited(self.connections, self._needed(), self._tell)
+        needed = wiring.reporting(options.recorded, self._own_names)
+        self._awaited = Awaited(self.connections, needed, self._tell)
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(patience)
         self._begun = 0.0  # wall time [s] at which this tick began
@@ -189,6 +189,7 @@ class Simulator:
             time.sleep(0.02)
             for message in self.node.door.messages(reader):
                 newest = max(newest, from_message(message.header.stamp))
+        self.node.door.forget(reader)
         self.node.destroy_subscription(reader)
         return newest
 
@@ -296,7 +297,8 @@ class Simulator:
         else:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
-        self._recorder_has_caught_up(0, LAST_WAIT)  # unread messages are lost when the node ends
+        last = LAST_WAIT if realtime else self._limit
+        self._recorder_has_caught_up(0, last)  # unread messages are lost when the node ends
 
     def _begin_tick(self) -> None:
         """Publish the samples and the truth of this tick, and prepare those of the autopilot."""
@@ -323,12 +325,6 @@ class Simulator:
         self.hil.prepare(taken, gyro, force, truth.state[0, POSITION], truth.quaternion)
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
 
-    def _needed(self) -> list[str]:
-        """Return the nodes that report and that a tick needs."""
-        own = dict.fromkeys(wire.publisher for wire in wiring.WIRES)
-        nodes = [one for one in own if one != wiring.PLANT and one not in self._own_names]
-        return [*nodes, wiring.RECORDER] if self.options.recorded else nodes
-
     def _tell(self, whom: str) -> None:
         self.health.waiting(whom, self.plant.time)
 
@@ -336,7 +332,7 @@ class Simulator:
         """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""
         patience = timeout
         if timeout is None and self.options.autopilot_always_answers:
-            patience = self.options.answer_timeout or math.inf
+            patience = self._limit
         self._awaited.begin()
 
         def going_on() -> bool:
@@ -366,7 +362,7 @@ class Simulator:
             self.executor.spin_once(0.05)
 
     def _wait_for_answers(self) -> None:
-        if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout or math.inf):
+        if not self._recorder_has_caught_up(RECORDER_LAG, self._limit):
             raise PlantStopped(
                 f"nothing recorded since {self.recorded.until / SECOND:g} s; the recorder is silent"
             )
@@ -380,7 +376,7 @@ class Simulator:
                 return
         own_imu = self._stamp is not None
         if own_imu or not self._unanswered:
-            self._patience = Patience(self.options.answer_timeout or math.inf)
+            self._patience = Patience(self._limit)
             self._awaited.begin()
         slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
         while missing := self.answers.missing(self._stamp):
@@ -392,7 +388,7 @@ class Simulator:
             if self._stop.raised or (self._restart.going_on and left <= 0.0):
                 break
             over = self._patience.over or self._awaited.lost
-            self._awaited.told(lambda: f"{' and '.join(sorted(missing))}{_suspected(missing)}")
+            self._awaited.told(lambda: f"{' and '.join(sorted(missing))}{suspected(missing)}")
             if not own_imu and left < -slack and not over:
                 break  # samples of the autopilot's IMU may be lost or refused
             if over:
@@ -431,7 +427,7 @@ class Simulator:
         limit = self.options.answer_timeout
         since = f"within {limit:g} s" if limit else f"in {REPORTS} reports of every node"
         what = f"no {' and no '.join(sorted(missing))} for t = {self.plant.time:.3f} s"
-        return f"{what} {since}{_suspected(missing)}"
+        return f"{what} {since}{suspected(missing)}"
 
     def _wait_until(self, deadline: float) -> None:
         left = deadline - time.monotonic()
@@ -470,12 +466,6 @@ def _warm_up(spare: Plant) -> None:
         spare.truth()
         rotors = len(spare.vehicle.description.rotors)
         spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
-
-
-def _suspected(missing: frozenset[str]) -> str:
-    """Return which node does not answer, for a text."""
-    suspect = SUSPECTS.get(missing)
-    return f"; {suspect} is silent" if suspect else ""
 
 
 def _listed(waiting: list[str]) -> str:

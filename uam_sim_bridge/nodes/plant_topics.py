@@ -168,6 +168,12 @@ SUSPECTS = {
 }
 
 
+def suspected(missing: frozenset[str]) -> str:
+    """Return which node does not answer, for a text; missing: answers."""
+    suspect = SUSPECTS.get(missing)
+    return f"; {suspect} is silent" if suspect else ""
+
+
 class Answers:
     """Answers of the nodes to a tick: setpoint sent, servo commands, magnet; state of the mission.
 

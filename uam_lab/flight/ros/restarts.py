@@ -21,12 +21,16 @@ class ChangedParameters:
     def __init__(self, node: Node, door: Door) -> None:
         """door: of the node."""
         self._subscription, self._door = listen(node, topics.CHANGES), door
+        self._namespace = node.get_namespace()
         self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
 
     def poll(self) -> None:
-        """Store the received changes."""
+        """Store the received changes; only those that the node itself has sent."""
+        own = prefix(self._namespace)
         for _, change in self._door.decoded(self._subscription, ParameterChange.from_message):
-            self.note(change)
+            # another sender could end the restart by an argument that the node refuses
+            if self._door.sender(self._subscription) == f"/{own}{change.node}":
+                self.note(change)
 
     def note(self, change: ParameterChange) -> None:
         """Store a change if it was accepted."""
