@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,10 +24,12 @@ from uam_lab.cockpit.vehicle_health import (
     CAUTION,
     CHAIN,
     GOOD,
+    TICK,
     UNKNOWN,
     Health,
     grade,
 )
+from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import (
@@ -38,6 +40,7 @@ from uam_msgs_py.messages.status import (
     MissionStatus,
     diagnostic,
 )
+from uam_msgs_py.messages.topics import WORLD
 from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
@@ -315,3 +318,40 @@ def test_the_buttons_of_the_checklist_call_its_services():
         gui.added[label].acts[0](None)
     assert called == ["checklist/confirm", "checklist/repeat"]
     assert said[0] == (False, "checklist: checklist/confirm: no response")
+
+
+class Scene:
+    """viser's scene, as far as frames need it."""
+
+    def __init__(self):
+        self.frames = {}
+
+    def add_grid(self, name, **look):
+        """Nothing to keep."""
+
+    def add_frame(self, name, **look):
+        return self.frames.setdefault(name, SimpleNamespace(position=None, wxyz=None))
+
+
+def test_frames_without_end_do_not_fill_the_page():
+    scene = Scene()
+    view = VehicleView(scene)
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+
+    def frame(number, x=0.0):
+        return Transform(0, WORLD, f"f{number}", np.array([x, 0.0, 0.0]), level)
+
+    view.transforms([frame(number) for number in range(MOST_FRAMES)])
+    with pytest.raises(BadMessage, match="200 frames"):
+        view.transforms([frame(MOST_FRAMES)])
+    view.transforms([frame(0, x=3.0)])
+    assert len(scene.frames) == MOST_FRAMES
+    assert scene.frames["/world/f0"].position[0] == 3.0
+
+
+def test_a_value_of_diagnostics_that_is_no_number_is_left_out():
+    values = [KeyValue(key=TICK, value=text) for text in ("1.5", "abc", "nan", "1e999", "")]
+    status = DiagnosticStatus(name="mission", level=OK, values=values)
+    health = Health(5.0)
+    health.diagnose(DiagnosticArray(status=[status]))
+    assert health.ticks == {"mission": 1.5e-3}

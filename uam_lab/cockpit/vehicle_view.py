@@ -11,10 +11,12 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_lab.cockpit.urdf_shapes import Shape, shapes
+from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.topics import WORLD
 from uam_msgs_py.messages.transforms import Transform
 
 REFERENCE = "reference"  # frame of the desired pose
+MOST_FRAMES = 200  # and markers: anyone may publish new ones without end
 GROUND = 12.0  # [m] edge of the floor shown
 CELL = 0.25  # [m]
 AXES = 0.12  # [m] of the reference frame
@@ -54,7 +56,8 @@ class VehicleView:
             own = replace(
                 transform, parent=self._own(transform.parent), child=self._own(transform.child)
             )
-            self._orphans[own.child] = own
+            if own.child in self._orphans or len(self._orphans) < MOST_FRAMES:
+                self._orphans[own.child] = own
         placed = True
         while placed:
             placed = [c for c, t in self._orphans.items() if t.parent in self._paths]
@@ -70,6 +73,8 @@ class VehicleView:
         if not np.isfinite(position.sum() + wxyz.sum()):
             return
         if child not in self._frames:
+            if len(self._frames) >= MOST_FRAMES:
+                raise BadMessage(f"frame {child}: {MOST_FRAMES} frames are shown already")
             path = self._paths[child] = f"{self._paths[transform.parent]}/{child}"
             self._frames[child] = self._scene.add_frame(
                 path, show_axes=child == REFERENCE, axes_length=AXES, axes_radius=AXES / 24.0
@@ -106,6 +111,8 @@ class VehicleView:
                     self._markers.pop(name).remove()
                     self._lines.pop(name, None)
             elif frame in self._paths:
+                if name not in self._markers and len(self._markers) >= MOST_FRAMES:
+                    raise BadMessage(f"marker {name}: {MOST_FRAMES} are shown already")
                 self._show(f"{self._paths[frame]}/{name.replace(' ', '_')}", marker)
 
     def _show(self, path: str, marker: Marker) -> None:
