@@ -18,6 +18,7 @@ from uam_msgs_py.node.node_parameters import plain
 # extra `browser`; make slow installs it
 from_playwright = pytest.importorskip("playwright.sync_api")
 expect = from_playwright.expect
+expect.set_options(timeout=60_000)
 
 PATIENCE = 60_000  # [ms] only a failing test waits that long
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -109,9 +110,13 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
     expect(page.get_by_text("OFFBOARD, armed")).to_be_visible()
     expect(page.get_by_text("companion")).to_be_visible()
     expect(page.get_by_text("ms there and back")).to_be_visible()
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()
     page.get_by_role("button", name="Kill").click()
     expect(page.get_by_text("a vehicle in the air falls. Kill?")).to_be_visible()
-    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("button", name="Cancel")).to_be_focused()
+    page.keyboard.press("Enter")  # must not kill
+    page.get_by_role("button", name="Magnet off").click(force=True)
+    expect(page.get_by_text("Magnet off?")).to_have_count(0)  # it is off
 
     first = scene(page)
     page.wait_for_timeout(500)
@@ -142,12 +147,43 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
     page.get_by_role("button", name="Resume").click()
     expect(state).not_to_contain_text("HOLDING", timeout=PATIENCE)
 
+    page.get_by_label("Go to").fill("0.5 0 1.2")
+    page.get_by_role("button", name="Go", exact=True).click()
+    expect(page.get_by_text("goal_pose: accepted")).to_be_visible()
+
     page.get_by_role("button", name="Freeze adaptation").click()
     until(lambda: value_in(flight, "arm_controller", "adapt") is False, "adaptation is frozen")
     expect(page.get_by_text("frozen: arm_controller, attitude_controller")).to_be_visible()
+
+    page.goto(f"{flight.address}/control")
+    plain = page.locator("#uam-plain")
+    expect(plain).to_contain_text("OFFBOARD, armed")
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()
+    page.get_by_role("button", name="Kill").click()
+    expect(page.get_by_text("a vehicle in the air falls. Kill?")).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("a vehicle in the air falls. Kill?")).to_be_hidden()
+    page.get_by_role("button", name="Hold").click()
+    expect(plain).to_contain_text("HOLDING")
 
     url = flight.address.replace("http", "ws")
     with connect(url, origin=flight.address, subprotocols=["viser-v0"]):
         pass
     with pytest.raises(InvalidStatus, match="403"):
         connect(url, origin="http://elsewhere.example", subprotocols=["viser-v0"])
+
+    page.get_by_role("button", name="Land").click()
+    expect(page.get_by_role("alert")).to_contain_text("The flight is over")
+    expect(page.get_by_role("alert")).to_contain_text("report.html")
+
+
+def test_a_browser_without_webgl_has_the_commands(flight):
+    with from_playwright.sync_playwright() as playwright:
+        without = ["--no-sandbox", "--disable-gpu", "--disable-webgl", "--disable-3d-apis"]
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=without)
+        page = browser.new_page(viewport={"width": 390, "height": 844})
+        page.set_default_timeout(PATIENCE)
+        page.goto(flight.address)
+        page.get_by_role("button", name="Hold").click()
+        expect(page.locator("#uam-plain")).to_contain_text("HOLDING", timeout=PATIENCE)
+        browser.close()

@@ -40,7 +40,13 @@ def test_the_report_is_one_page_without_external_files(flight_folder, monkeypatc
     assert report.problem == ""
     assert steps[-1] == "page"
     assert html.count('src="data:image/png;base64,') == 2
-    assert all(source.startswith("data:") for source in re.findall(r'(?:src|href)="([^"]*)', html))
+    assert all(source.startswith("data:") for source in re.findall(r'src="([^"]*)', html))
+    # links lead to a part of the page or to a file beside it
+    links = re.findall(r'href="([^"]*)', html)
+    assert "metrics.json" in links
+    for link in links:
+        part = f'id="{link[1:]}"' in html
+        assert part if link.startswith("#") else (flight_folder / link).exists(), link
     assert not re.search(r"@import|url\(|<link|<script", html)
 
 
@@ -86,8 +92,6 @@ def test_the_page_marks_errors_above_the_papers_and_shows_the_abort_reason(fligh
     change_metrics(
         flight_folder,
         rms=metrics["rms"],
-        mission_completed=False,
-        abort_reason="tilt <70>",
         shortfalls=["aborted: tilt <70>"],
         clock="realtime",
         latency_ms={"p50": 2.5, "p99": 10.25, "max": None},
@@ -96,10 +100,30 @@ def test_the_page_marks_errors_above_the_papers_and_shows_the_abort_reason(fligh
     html = flight_page.write_page(flight_folder).read_text()
     words = text_of(html)
     assert "aborted: tilt &lt;70&gt;" in html
-    assert "Mission aborted" in words
     assert (words.count("better"), words.count("equal"), words.count("worse")) == (5, 1, 1)
     assert "10.25 ms" in words
     assert "missed control ticks 7" in words
+
+
+def test_a_flight_that_was_not_completed_is_not_compared(flight_folder):
+    change_metrics(flight_folder, mission_completed=False, abort_reason="tilt")
+    words = text_of(flight_page.write_page(flight_folder).read_text())
+    out = io.StringIO()
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    Terminal(file=out, width=100).print(console.summary(metrics))
+    assert "Mission aborted" in words
+    for text in (words, out.getvalue()):
+        assert " ".join(text.split()).count("errors are not compared with those of the paper") == 1
+        assert not any(word in text for word in ("better", "worse", "equal"))
+
+
+def test_the_video_has_a_picture_before_it_plays(flight_folder, tmp_path):
+    picture, video = tmp_path / "b.png", tmp_path / "flight.mp4"
+    picture.write_bytes(b"picture")
+    video.write_bytes(b"video")
+    rendered = flight_video.Rendered((picture,), picture, video)
+    html = flight_page.write_page(flight_folder, rendered).read_text()
+    assert html.count('poster="data:image/png;base64,cGljdHVyZQ=="') == 1
 
 
 def test_page_and_console_show_the_supervisors_interventions(flight_folder):

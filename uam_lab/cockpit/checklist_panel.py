@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import viser
 from std_srvs.srv import Trigger
 
-from uam_lab.cockpit.buttons import Later
+from uam_lab.cockpit.commands import Later, Said
 from uam_lab.cockpit.headline import COLOURS, MARKS
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN
@@ -49,9 +49,9 @@ class ChecklistPanel:
         gui: viser.GuiApi,
         services: Services,
         later: Later,
-        said: Callable[[bool, str], None],
+        said: Said,
     ) -> None:
-        """later: passes a click to the thread that processes it; said: see `CommandButtons`."""
+        """later: passes a click to the thread that processes it; said: gets the answers."""
         self._gui, self._services, self._later, self._said = gui, services, later, said
         self._html: viser.GuiHtmlHandle | None = None
         self._buttons: dict[str, Any] = {}

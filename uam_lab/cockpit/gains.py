@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import viser
 
-from uam_lab.cockpit.buttons import Later
+from uam_lab.cockpit.commands import Later, Said
 from uam_lab.cockpit.entry import axes, reach, text_of, value_of
 from uam_lab.cockpit.remote_parameters import About, RemoteParameters
+from uam_lab.cockpit.texts import shown
 
 OPEN = ("lambda_1", "lambda_2")  # parameters at the top, unfolded
 INTERVAL = 0.15  # [s] minimum wall time between two requests of a slider
-Said = Callable[[bool, str], None]
 
 
 class ParameterEntry:
@@ -31,7 +30,7 @@ class ParameterEntry:
         self._folder = gui.add_folder(self._label(value), expand_by_default=self._name in OPEN)
         self._sliders: list[viser.GuiSliderHandle] = []
         with self._folder:
-            gui.add_markdown(f"{about.description}  \n{about.constraints}")
+            gui.add_html(shown([about.description, about.constraints]))
             if isinstance(value, bool):
                 self._field: Any = gui.add_checkbox(self._name, value)
                 self._field.on_update(self._entered)
@@ -43,7 +42,7 @@ class ParameterEntry:
                     self._field = gui.add_text(self._name, text_of(value), hint="Enter applies it")
                 form.on_submit(self._entered)
                 self._add_sliders(gui, value)
-            self._reason = gui.add_markdown("", visible=False)
+            self._reason = gui.add_html("", visible=False)
 
     def _label(self, value: Any) -> str:
         return f"{self._name} = {text_of(value)}"
@@ -106,7 +105,7 @@ class ParameterEntry:
         self._remote.set({self._name: value}, answered)
 
     def _refused(self, why: str) -> None:
-        self._reason.content = f"**refused**: {_escaped(why)}"
+        self._reason.content = shown([f"refused: {why}"])
         self._reason.visible = True
         self._said(False, f"{self._remote.node}: {why}")
         self.show(self._remote.values[self._name])
@@ -156,8 +155,3 @@ class NodeGains:
         for name, value in values.items():
             if name in self._entries and value is not None:
                 self._entries[name].show(value)
-
-
-def _escaped(text: str) -> str:
-    """Return text escaped for markdown and HTML."""
-    return "".join(f"&#{ord(char)};" if char in "<>&*_`[]()#\\" else char for char in text)

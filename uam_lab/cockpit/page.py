@@ -16,10 +16,13 @@ from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit.buttons import CommandButtons
 from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.checklist_panel import ChecklistPanel
+from uam_lab.cockpit.commands import Commands
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.headline import headline
+from uam_lab.cockpit.plain_page import PlainPage
 from uam_lab.cockpit.remote_parameters import RemoteParameters
 from uam_lab.cockpit.services import Services
+from uam_lab.cockpit.texts import shown
 from uam_lab.cockpit.vehicle_health import Health
 from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
@@ -56,13 +59,17 @@ class Page:
         options: dict[str, Any],
         joints: Sequence[str],
         period: float,
+        plain: PlainPage,
+        todo: queue.SimpleQueue[Callable[[], None]],
         namespace: str = "/",
     ):
         """options: config/views/cockpit.yaml; joints: names of the arm's coordinates; period: of
-        control [s]; namespace: of the vehicle's nodes.
+        control [s]; plain: shows the same without the scene; todo: clicks, processed by `look`;
+        namespace: of the vehicle's nodes.
         """
         self._server, self._options = server, options
-        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._todo, self._plain = todo, plain
+        self._answers_seen: int | None = None
         self._watch, self._services = watch, services
         self._health = Health(options["silent_after"], namespace, period=period)
         self._lines: deque[str] = deque(maxlen=LINES)
@@ -78,10 +85,11 @@ class Page:
         self._headline = gui.add_html("")
         self._shown = ""
         with gui.add_folder("Commands"):
-            self._commands = CommandButtons(gui, self._services, self._todo.put, self.say)
+            self._commands = Commands(self._services, self._health, self.say)
+            self._buttons = CommandButtons(gui, self._commands, self._todo.put)
         self._checklist = ChecklistPanel(gui, self._services, self._todo.put, self.say)
         self._follow = gui.add_checkbox("Camera follows the vehicle", False)
-        self._answers = gui.add_markdown("")
+        self._answers = gui.add_html("")
         self._followed = np.zeros(3)
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_WIDTH)
@@ -110,13 +118,14 @@ class Page:
             self._update_headline()
         if now >= self._due["nodes"]:
             self._due["nodes"] = now + RETRY
-            self._commands.look()
+            if self._health.mission is not None:
+                self._services.offer(topics.GOAL_POSE)
             self._find_nodes()
 
     def say(self, done: bool, text: str) -> None:
         """Add a line to the answers; a failure is also shown as a notification."""
         self._lines.appendleft(text)
-        self._answers.content = "\n\n".join(self._lines)
+        self._answers.content = shown(self._lines)
         if not done:
             for client in self._server.get_clients().values():
                 client.add_notification("Refused", text, auto_close_seconds=8.0, color="red")
@@ -124,14 +133,18 @@ class Page:
     def _update_headline(self) -> None:
         self._health.silence = self._watch.silence
         self._health.refused = self._watch.door.refusals.count
-        shown = headline(self._health, self._options)
-        if shown != self._shown:
-            self._headline.content = self._shown = shown
+        found = headline(self._health, self._options)
+        if found != self._shown:
+            self._headline.content = self._shown = found
+        mission = self._health.mission
+        over = mission is not None and mission.done
+        self._plain.show(found, list(self._lines), over, self._commands)
+        self._buttons.look()
 
     def _take(self, topic: Topic, message: Any) -> None:
         health = self._health
         if topic is topics.MISSION_STATUS:
-            health.set_mission(MissionStatus.from_message(message)[1])
+            self._see_mission(MissionStatus.from_message(message)[1])
         elif topic is topics.AUTOPILOT_STATE:
             health.autopilot = AutopilotState.from_message(message)[1]
         elif topic is topics.PREFLIGHT:
@@ -154,6 +167,13 @@ class Page:
             self._charts.show(topic, message)
         if topic is topics.TRACKING_ERROR:
             health.track(np.array(message.position))
+
+    def _see_mission(self, mission: MissionStatus) -> None:
+        """Take the mission's status, and say its answer to a goal."""
+        if self._answers_seen not in (None, mission.answers):
+            self.say(": refused" not in mission.answer, mission.answer)
+        self._answers_seen = mission.answers
+        self._health.set_mission(mission)
 
     def _changed(self, change: ParameterChange) -> None:
         """Show an accepted change of parameters, of any client."""

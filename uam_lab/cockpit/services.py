@@ -8,6 +8,8 @@ from typing import Any
 
 from rclpy.node import Node
 
+from uam_msgs_py.messages.topics import Topic
+
 PATIENCE = 3.0  # [s] of wall time for an answer
 
 Answer = Callable[[Any, str], None]
@@ -19,6 +21,7 @@ class Services:
     def __init__(self, node: Node):
         self._node = node
         self._clients: dict[str, Any] = {}
+        self._publishers: dict[str, Any] = {}
         self._open: list[tuple[Any, Any, float, Answer]] = []
 
     def client(self, kind: type, name: str) -> Any:
@@ -26,6 +29,17 @@ class Services:
         if name not in self._clients:
             self._clients[name] = self._node.create_client(kind, name)
         return self._clients[name]
+
+    def publish(self, topic: Topic, message: Any) -> None:
+        """Publish a message; the publisher is made at the first one that is asked for."""
+        self.offer(topic).publish(message)
+
+    def offer(self, topic: Topic) -> Any:
+        """Return the publisher of a topic; create it if necessary."""
+        if topic.name not in self._publishers:
+            made = self._node.create_publisher(topic.type, topic.name, topic.qos)
+            self._publishers[topic.name] = made
+        return self._publishers[topic.name]
 
     def ready(self, kind: type, name: str) -> bool:
         """Return whether a node offers the service."""

@@ -1,4 +1,4 @@
-"""The server of the page: address, port and allowed origins."""
+"""The server of the pages: address, port, allowed origins, and what a page may load."""
 
 from __future__ import annotations
 
@@ -6,24 +6,44 @@ import contextlib
 import functools
 import io
 import re
+import secrets
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import viser
 import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from uam_lab.cockpit.page_address import LOCAL, address, free_port
+from uam_lab.cockpit.plain_page import HEADER, PlainPage
+
+# "{nonce}": new for each answer; styles in elements are those of viser and of the headline.
+# {decoder}: viser compiles the decoder of its messages; it may, a script from a text may not.
+POLICY = (
+    "default-src 'none'; script-src 'nonce-{nonce}' 'wasm-unsafe-eval' blob:{decoder}; "
+    "worker-src blob:; "
+    "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+    "connect-src 'self' ws://{host} wss://{host} data: blob:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+Origin = str | re.Pattern[str]
+Handler = Callable[[ServerConnection, Request], Response | None]
 
 
-def serve(host: str, port: int, label: str, origins: Sequence[str] = ()) -> viser.ViserServer:
-    """Serve on `host`, at the first free port from `port` on, 0 for any.
+def serve(
+    host: str, port: int, label: str, plain: PlainPage, origins: Sequence[str] = ()
+) -> viser.ViserServer:
+    """Serve on `host`, at the first free port from `port` on, 0 for any; plain: the plain page.
 
     Pages of other origins may not connect: only those of this host, and `origins` (as
     "http://name:port"). Raises AddressError.
     """
     found = free_port(host, port)
-    allowed = [*_own_origins(host, found), *origins, None]  # None: no browser
-    with _origins(allowed), contextlib.redirect_stdout(io.StringIO()):
+    allowed = [*_own_origins(host, found), *origins]
+    with _guarded(allowed, plain), contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=found, label=label, verbose=False)
     return server
 
@@ -33,7 +53,7 @@ def url(server: viser.ViserServer) -> str:
     return address(server.get_host(), server.get_port())
 
 
-def _own_origins(host: str, port: int) -> list[str | re.Pattern[str]]:
+def _own_origins(host: str, port: int) -> list[Origin]:
     names = {"localhost", LOCAL, host}
     if host not in ("localhost", LOCAL):  # reachable from other computers, by these names
         names |= {socket.gethostname(), socket.getfqdn()}
@@ -43,11 +63,74 @@ def _own_origins(host: str, port: int) -> list[str | re.Pattern[str]]:
 
 
 @contextlib.contextmanager
-def _origins(allowed: Sequence[str | re.Pattern[str] | None]) -> Iterator[None]:
-    """Set the allowed origins in websockets, as viser has no option for them."""
-    plain = websockets.asyncio.server.serve
-    websockets.asyncio.server.serve = functools.partial(plain, origins=list(allowed))
+def _guarded(allowed: Sequence[Origin], plain: PlainPage) -> Iterator[None]:
+    """Set origins and answers in websockets, as viser has no option for them."""
+    original = websockets.asyncio.server.serve
+
+    def guarded(*given: Any, process_request: Handler, **how: Any) -> Any:
+        handler = functools.partial(_answer, process_request, allowed, plain)
+        everyone = [*allowed, None]  # None: no browser
+        return original(*given, process_request=handler, origins=everyone, **how)
+
+    websockets.asyncio.server.serve = guarded
     try:
         yield
     finally:
-        websockets.asyncio.server.serve = plain
+        websockets.asyncio.server.serve = original
+
+
+def _answer(
+    viser_answer: Handler,
+    allowed: Sequence[Origin],
+    plain: PlainPage,
+    connection: ServerConnection,
+    request: Request,
+) -> Response | None:
+    """Answer a request; None for a websocket, whose origin the library checks."""
+    host = request.headers.get("Host", "")
+    if not any(_is(one, f"http://{host}") for one in allowed):  # a foreign name of this address
+        return _response(connection, 403, "text/plain", b"not the name of this page\n", host)
+    if request.headers.get("Upgrade") == "websocket":
+        return None
+    found = plain.answer(request.path, request.headers.get(HEADER))
+    if found is not None:
+        return _response(connection, *found, host)
+    if "Accept-Encoding" in request.headers:  # the text is changed below
+        del request.headers["Accept-Encoding"]
+    page = viser_answer(connection, request)
+    kind = page.headers.get("Content-Type", "text/plain")
+    body = page.body or b""
+    if page.status_code == 200 and kind.startswith("text/html"):
+        # before the page's own script; the name of the nonce is replaced with it
+        begin, end = (plain.page(part).encode() for part in ("scene.html.j2", "watching.html.j2"))
+        body = body.replace(b"<script ", begin + b'<script nonce="@NONCE@" ', 1)
+        body = body.replace(b"</body>", end + b"</body>")
+    return _response(connection, page.status_code, kind, body, host, " 'unsafe-eval'")
+
+
+def _is(allowed: Origin, origin: str) -> bool:
+    return allowed == origin if isinstance(allowed, str) else bool(allowed.fullmatch(origin))
+
+
+def _response(
+    connection: ServerConnection, status: int, kind: str, body: bytes, host: str, decoder: str = ""
+) -> Response:
+    """Return the answer, with what the page may load, and that no other page may frame it."""
+    nonce = secrets.token_urlsafe(16)
+    if kind.startswith("text/html"):
+        body = body.replace(b"@NONCE@", nonce.encode())
+    made = connection.respond(status, "")
+    made.headers = Headers(
+        [
+            ("Content-Type", kind),
+            ("Content-Length", str(len(body))),
+            ("Connection", "close"),
+            ("Cache-Control", "no-store"),
+            ("Content-Security-Policy", POLICY.format(nonce=nonce, host=host, decoder=decoder)),
+            ("X-Frame-Options", "DENY"),
+            ("X-Content-Type-Options", "nosniff"),
+            ("Referrer-Policy", "no-referrer"),
+        ]
+    )
+    made.body = body
+    return made

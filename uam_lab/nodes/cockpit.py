@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import time
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ from uam_lab.cockpit import web
 from uam_lab.cockpit.frame_rate import FrameRate
 from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
+from uam_lab.cockpit.plain_page import PlainPage
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.node.answering import ServingExecutor
@@ -33,6 +35,7 @@ class CockpitParameters(ParameterSet):
 
     host: str = text(LOCAL, "address at which the page is served", f"{LOCAL}: this computer only")
     port: int = integer(PORT, "TCP port; the next free one from it on, 0: any", 0, 65535)
+    results: str = text("", "folder of the results", "shown when the flight is over; or empty")
     origins: str = text(
         "", "other pages that may connect", "as http://name:port, with commas between; empty: none"
     )
@@ -51,7 +54,9 @@ def main() -> int:
         rightful = rightful_nodes(node)
         refuse_unknown(node)
         origins = [one for one in served.origins.split(",") if one]
-        server = web.serve(served.host, served.port, "uam", origins)
+        todo = queue.SimpleQueue()
+        plain = PlainPage(todo.put, served.results)
+        server = web.serve(served.host, served.port, "uam", plain, origins)
     except (ParameterError, AddressError) as error:
         return refuse(NAME, error)
     print(f"{NAME}: {web.url(server)}", flush=True)
@@ -66,6 +71,8 @@ def main() -> int:
         options,
         vehicle.coordinates[ARM],
         vehicle.control_period,
+        plain,
+        todo,
         node.get_namespace(),
     )
     rate = FrameRate(options["scene_period"], options["slowest_period"])

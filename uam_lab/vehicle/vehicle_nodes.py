@@ -59,7 +59,8 @@ def parameters(
         sections[wiring.BRIDGE] |= lab.magnet.output.to_mapping() | _switching(lab)
     host = lab.cockpit.address
     port = page_address.free_port(host, lab.cockpit.port)
-    sections[wiring.COCKPIT] = {"host": host, "port": port}
+    results = str(folder.path.absolute())
+    sections[wiring.COCKPIT] = {"host": host, "port": port, "results": results}
     sections[wiring.ARM_DRIVER] = WAITS | {
         "hardware": str(lab.arm_file.absolute()),
         "device": lab.arm.device,

@@ -112,7 +112,8 @@ def parameters(
     }
     if wiring.COCKPIT not in settings.without:
         sections[wiring.COCKPIT] = {
-            "port": page_address.free_port(page_address.LOCAL, page_address.PORT)
+            "port": page_address.free_port(page_address.LOCAL, page_address.PORT),
+            "results": str(folder.path.absolute()),
         }
     return complete(sections, settings, folder)
 

@@ -22,11 +22,13 @@ class ErrorRow:
     rms: float | None
     paper: float | None
     largest: float | None
+    compared: bool = True  # with the paper's
 
     @property
     def better(self) -> bool | None:
-        """Return whether the RMS is at most the paper's, None without an RMS or a published one."""
-        return None if self.rms is None or self.paper is None else self.rms <= self.paper
+        """Return whether the RMS is at most the paper's, None without a comparison."""
+        known = self.compared and self.rms is not None and self.paper is not None
+        return self.rms <= self.paper if known else None
 
     def shown(self, value: float | None) -> str:
         """Return `value` with the unit and the digits of this row."""
@@ -34,6 +36,13 @@ class ErrorRow:
             return "–"
         gap = "" if self.unit == "°" else " "
         return f"{value:.{self.digits}f}{gap}{self.unit}"
+
+
+def not_compared(metrics: Mapping[str, Any]) -> str:
+    """Return why the errors are not compared with the paper's, "" if they are."""
+    if metrics["mission_completed"]:
+        return ""
+    return "The flight was not completed: its errors are not compared with those of the paper."
 
 
 def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
@@ -47,7 +56,10 @@ def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
             metrics["max"][group],
             strict=True,
         )
-        rows += [ErrorRow(heading, name, unit, digits, *figures) for name, *figures in columns]
+        rows += [
+            ErrorRow(heading, name, unit, digits, *figures, not not_compared(metrics))
+            for name, *figures in columns
+        ]
     return rows
 
 

@@ -50,6 +50,7 @@ def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
 def error_table(metrics: Mapping[str, Any]) -> Table:
     """Return the table of the RMS errors of the whole flight beside the paper's."""
     table = Table(title="RMS error, take-off to touchdown command", title_justify="left")
+    table.caption, table.caption_justify = flight_summary.not_compared(metrics) or None, "left"
     table.add_column("")
     for heading in ("this flight", "paper", "largest"):
         table.add_column(heading, justify="right")
@@ -61,7 +62,7 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
         group = row.group
         good = {True: ("green", "better"), False: ("yellow", "worse"), None: ("dim", "")}
         colour, word = good[row.better]
-        if row.rms is not None and row.rms == row.paper:
+        if row.better and row.rms == row.paper:
             word = "equal"
         table.add_row(
             row.name,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,19 @@ FACTS = (
     ("autopilot", "autopilot"),
     ("seed", "seed"),
     ("payload_mass_kg", "payload mass [kg]"),
+)
+
+FILES = (
+    ("log.mcap", "the log of all topics, a bag of ROS 2"),
+    ("px4.ulg", "the log of PX4"),
+    ("timeseries.parquet", "one row per control tick"),
+    ("metrics.json", "the numbers of this page"),
+    ("stability.json", "the stability analysis"),
+    ("parameters.yaml", "the parameters of all nodes"),
+    ("info.json", "conditions and command of the flight"),
+    ("versions.json", "versions of the software"),
+    ("figures", "the figures as PNG and SVG, snapshots and video"),
+    ("logs", "what each process printed"),
 )
 
 
@@ -54,6 +67,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         landing=flight_summary.landing_story(metrics),
         thrust=flight_summary.thrust_story(metrics),
         errors=flight_summary.error_rows(metrics),
+        not_compared=flight_summary.not_compared(metrics),
         phases=flight_summary.phase_rows(metrics),
         phase_headings=flight_summary.PHASE_HEADINGS,
         clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
@@ -64,6 +78,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
         strip=_embedded(rendered.strip),
         video=_embedded(rendered.video),
+        poster=_embedded(_middle(rendered.snapshots)),
         problem=rendered.problem,
         figures=_figures(directory / "figures"),
         stability=_stability(directory / "stability.json"),
@@ -71,6 +86,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         no_parameters=no_parameters,
         versions=_json(directory / "versions.json"),
         command=info.get("command"),
+        files=[(name, about) for name, about in FILES if (directory / name).exists()],
     )
     write_text(directory / "report.html", text)
     return directory / "report.html"
@@ -83,6 +99,11 @@ def _figures(folder: Path) -> list[tuple[str, str, str]]:
         for name, (_, caption) in FIGURES.items()
         if (folder / f"{name}.png").exists()
     ]
+
+
+def _middle(pictures: Sequence[Path]) -> Path | None:
+    """Return the picture that stands for the video before it plays."""
+    return pictures[len(pictures) // 2] if pictures else None
 
 
 def _stability(file: Path) -> dict[str, Any] | None:
