@@ -121,11 +121,10 @@ class TopicRecorder:
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
         # a foreign message would be a row of the table
         self.door.guard(subscription, topic.name, self._rightful, lambda: self._clock_sim != [])
-        own, guard = own_part(topic, self._namespace), self.door.guards.get(subscription)
-        if guard is not None:
-            return Track(topic.name, subscription, guard.taker, guard.take, stamped, channel, own)
-        taker, read = Taker(subscription), _reader(topic)
-        return Track(topic.name, subscription, taker, taker.take, stamped, channel, own, read)
+        guard, taker = self.door.guards.get(subscription), self.door.taker(subscription)
+        read, take = (_reader(topic), taker.take) if guard is None else (None, guard.take)
+        own = own_part(topic, self._namespace)
+        return Track(topic.name, subscription, taker, take, stamped, channel, own, read)
 
     def poll(self) -> int:
         """Write all received messages; return their number."""

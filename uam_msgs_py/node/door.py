@@ -72,7 +72,7 @@ class Door:
 
         They are serialized if the subscription is raw.
         """
-        source = self.guards.get(subscription) or self._taker(subscription)
+        source = self.guards.get(subscription) or self.taker(subscription)
         kind, raw = subscription.msg_type, subscription.raw
         while (found := source.take_message()) is not None:
             if not raw:
@@ -114,7 +114,7 @@ class Door:
         else:
             sender, rightful = guard.rightful, guard.publisher
         expected = isinstance(error, BadMessage)
-        reason = str(error) if expected else f"{type(error).__name__}: {error}"
+        reason = str(error if expected else BadMessage(f"{type(error).__name__}: {error}"))
         self.refusals.note(topic, sender, rightful, reason)
         if not expected and self.due(f"{topic} {type(error).__name__}"):
             traceback.print_exception(error)  # perhaps an error of the program
@@ -148,14 +148,17 @@ class Door:
 
         Who publishes it is looked up at most every NAMES_PERIOD.
         """
-        topic, gid = subscription.topic_name, bytes(self._taker(subscription).gid)
+        topic, gid = subscription.topic_name, bytes(self.taker(subscription).gid)
         looked, names = self._names.get(topic, (-NAMES_PERIOD, {}))
         if gid not in names and time.monotonic() - looked >= NAMES_PERIOD:
             names = publishers(self._node, topic)
             self._names[topic] = time.monotonic(), names
         return names.get(gid, UNKNOWN)
 
-    def _taker(self, subscription: Subscription) -> Taker:
+    def taker(self, subscription: Subscription) -> Taker:
+        """Return what takes the messages of a subscription, the guard's if it has one."""
+        if guard := self.guards.get(subscription):
+            return guard.taker
         made = self._takers.get(subscription)
         if made is None:
             made = self._takers[subscription] = Taker(subscription)
