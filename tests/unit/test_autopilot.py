@@ -28,6 +28,7 @@ class Bench:
         self.body = Quadrotor(height=height)
         self.vision = True
         self.vision_tilt = np.array([1.0, 0.0, 0.0, 0.0])
+        self.accelerometer_bias = np.zeros(3)  # m/s^2, FLU
         self.ticks = 0
 
     @property
@@ -44,7 +45,8 @@ class Bench:
         if setpoint is not None:
             rates = swap_body(np.array(setpoint[0], float))
             assert not autopilot.target(body.time, AttitudeTarget.of_rates(rates, setpoint[1]))
-        motors = autopilot.update(body.time, swap_body(body.gyro), swap_body(body.accel))
+        accel = body.accel + self.accelerometer_bias
+        motors = autopilot.update(body.time, swap_body(body.gyro), swap_body(accel))
         body.step(motors)
         return motors
 
@@ -342,3 +344,26 @@ def test_in_position_the_stick_takes_off():
             bench.autopilot.manual(bench.time, (0.0, 0.0, stick, 0.0))
             bench.run(0.25)
         assert (bench.body.position[2] > 0.2) == rises
+
+
+@pytest.mark.parametrize("bias", [-0.15, 0.15])
+@pytest.mark.parametrize("seconds", [0.3, 1.0])
+@pytest.mark.parametrize("wait", [0.0, 6.0])
+def test_a_vehicle_without_vision_comes_down_once_and_is_disarmed(bias, seconds, wait):
+    # the accelerometer's bias is known from the ground; after 5 s the sink speed is not valid
+    bench = Bench()
+    bench.accelerometer_bias[2] = bias
+    bench.fly()
+    bench.run(0.2, ((0, 0, 0), 1.1 * HOVER))
+    bench.run(seconds, ((0, 0, 0), 1.02 * HOVER))
+    bench.vision = False
+    bench.run(wait, ((0, 0, 0), HOVER))
+    heights = []
+    for _ in range(round(25.0 / 0.004)):
+        bench.tick()
+        heights.append(bench.body.position[2])
+        if not bench.autopilot.status.armed:
+            break
+    assert not bench.autopilot.status.armed and "Disarmed by landing" in bench.texts()
+    down = next(i for i, height in enumerate(heights) if height <= 0.0)
+    assert max(heights[down:]) < 0.01 and max(heights) < heights[0] + 0.5

@@ -230,7 +230,7 @@ class Mission:
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
                     guidance.stay(stamp, state, self._ground, self._age)
-                if output.state is State.RELEASED:
+                if output.state in (State.RELEASED, State.FAILSAFE):
                     guidance.follow(stamp, state)
                 event = changes[-1].event if len(changes) > before else None
                 if event is Event.GOAL or (moved and event is None):
@@ -435,29 +435,39 @@ class Mission:
             self._guidance.move_arm(stamp, state[CHI, ARM] if standing.value else None)
 
     def _enter(self, stamp: float, before: State, decision: Decision) -> None:
-        state, guidance, self._descent = decision.state, self._guidance, None
-        planned = decision.guide is Guide.SCENARIO or self.changes[-1].event is Event.TOUCHDOWN
-        if state not in (State.HOLDING, State.RELEASED) and not planned:
+        state, guidance, event = decision.state, self._guidance, self.changes[-1].event
+        if state is State.BLIND and before is State.LANDING:
+            return  # it goes on
+        self._descent = None
+        planned = decision.guide is Guide.SCENARIO or event is Event.TOUCHDOWN
+        waits = state in (State.HOLDING, State.RELEASED, State.BLIND)
+        self._fell_since = math.inf
+        if before is State.FAILSAFE and event is Event.AGREES:
+            self.output.abort_reason = ""
+        elif not waits and not planned and before is not State.FAILSAFE:
             reasons = (self.output.abort_reason, decision.cause)
             self.output.abort_reason = "; then ".join(filter(None, reasons))
         if state is State.TAKING_OFF:
             self._take_off(stamp)
-        elif state is State.HOLDING and before is State.RELEASED:
+        elif state is State.HOLDING and before in (State.RELEASED, State.FAILSAFE):
             guidance.stay(stamp, self._seen.state, self._ground, self._age)
-        elif state in (State.HOLDING, State.RELEASED):
-            arrived = self.changes[-1].event is Event.ARRIVED
-            guidance.stop(stamp, decision.stow and not arrived)
+        elif waits:
+            guidance.stop(stamp, decision.stow and event is not Event.ARRIVED)
             self._touchdown.stay()
-        elif self.changes[-1].event in (Event.CLEAR, Event.RESTARTED):
+            if state is State.BLIND:
+                guidance.retreat(stamp, self._watch.clear(guidance.motion[CHI]))
+        elif event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
             self._descent = decision
+            if before is State.FAILSAFE:
+                guidance.stay(stamp, self._seen.state, self._ground, self._age)
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
         elif state is State.FAILSAFE:
-            guidance.rest(stamp, decision.stow)
+            guidance.stop(stamp, decision.stow)
             self._fell_since = stamp
-        elif self.changes[-1].event is Event.STOPPED:
+        elif event is Event.STOPPED:
             self._fell_since = stamp
             self._override.forget()
         elif state is State.DISARMED:

@@ -42,7 +42,7 @@ def _unshifted(motion: np.ndarray) -> None:
 
 
 class Guidance:
-    """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
+    """Writes the reference of a flight; the mission calls `stop`, `go_on`, `retreat` and `descend`.
 
     `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
     (5, 6 + n): the same without attitude, with jerk and snap. `scenario_time` [s]: time on the
@@ -76,7 +76,7 @@ class Guidance:
         self._path = np.zeros_like(self.motion)
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: WayBack | None = None  # offset from the path, on the way back to it
-        self._brake: Braking | None = None  # in place of the path, after a release
+        self._brake: Braking | Segment | None = None  # in place of the path, after a release
         self._return_at = math.inf  # stamp [s] at which the brake is over and the return begins
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
@@ -212,8 +212,10 @@ class Guidance:
     def follow(self, stamp: float, state: np.ndarray) -> None:
         """Set the reference to the vehicle's pose, at rest, while somebody else has control.
 
-        Call it after `write`; state (3, 6 + n).
+        Call it after `write`; state (3, 6 + n). A pose that is not finite is not followed.
         """
+        if not np.all(np.isfinite(state[CHI])):
+            return
         pose = self.motion[:, :ALPHA]
         pose[:] = 0.0
         pose[CHI, POSITION], pose[CHI, YAW] = state[CHI, POSITION], state[CHI, YAW]
@@ -318,9 +320,15 @@ class Guidance:
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
-    def rest(self, stamp: float, stow: bool) -> None:
-        """Bring the reference to rest; in failsafe only its arm angles are used."""
-        self._last = Segment(stamp, self.motion, *self._at_rest(stow))
+    def retreat(self, stamp: float, way: np.ndarray) -> None:
+        """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it."""
+        if not np.any(way):
+            return
+        goal, lengths = self._at_rest(stow=False)
+        goal[POSITION] += way
+        hardest = HARDEST * float(np.linalg.norm(way)) / self.parameters.brake_acceleration
+        lengths[:] = max(float(np.max(lengths)), math.sqrt(hardest))
+        self._brake = Segment(stamp, self.motion, goal, lengths, BASE)
 
     def _stop_clock(self, stamp: float, acceleration: float | None = None) -> None:
         """Slow down to a stop on the path."""

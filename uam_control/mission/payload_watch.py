@@ -62,6 +62,7 @@ class PayloadWatch:
         self._places = PlaceHistory()  # of the magnet
         self._planned: tuple[GraspWindow, np.ndarray] | None = None  # magnet at its descent
         self._left_out: GraspWindow | None = None
+        self._stands = [self._magnet_at(window.grip)[:Z] for window in windows]
 
     @property
     def decisions(self) -> list[GraspDecision]:
@@ -71,7 +72,10 @@ class PayloadWatch:
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = self.executive.parameters = parameters
-        self._mount, self._links = np.array(parameters.arm_mount), np.array(parameters.arm_links)
+        joints, links = self._guidance.motion.shape[1] - ALPHA, parameters.arm_links
+        self._known = len(links) == joints  # the arm's geometry
+        self._links = np.array(links) if self._known else np.zeros(joints)
+        self._mount = np.array(parameters.arm_mount)
 
     def advance(self, stamp: float) -> None:
         """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""
@@ -110,9 +114,7 @@ class PayloadWatch:
 
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:
         p, chi = self._parameters, state[CHI]
-        known = len(p.arm_links) == len(chi) - ALPHA
-        links = self._links if known else np.zeros(len(chi) - ALPHA)
-        magnet, arm = magnet_and_lever(chi, self._mount, links, p.magnet_length)
+        magnet, arm = magnet_and_lever(chi, self._mount, self._links, p.magnet_length)
         self._places.add(readings.stamp, magnet)
         sight = Sight(
             stamp,
@@ -123,7 +125,7 @@ class PayloadWatch:
             lever=arm,
             on_path=not self._guidance.coming_back,
         )
-        if known and -MOST_AHEAD <= readings.payload_age <= p.payload_age:
+        if self._known and -MOST_AHEAD <= readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
             sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
             self._look_ahead(sight)
@@ -136,11 +138,27 @@ class PayloadWatch:
         window = self.executive.aligns_for
         if window is None:
             return
-        guidance, length = self._guidance, self._parameters.magnet_length
         if self._planned is None or self._planned[0] is not window:
-            motion = np.zeros_like(guidance.motion)
-            guidance.trajectory.write(window.descent, motion)
-            at, _ = magnet_and_lever(motion[CHI], self._mount, self._links, length)
-            self._planned = window, at
-        now, _ = magnet_and_lever(guidance.reference[CHI], self._mount, self._links, length)
+            self._planned = window, self._magnet_at(window.descent)
+        length = self._parameters.magnet_length
+        chi = self._guidance.reference[CHI]
+        now, _ = magnet_and_lever(chi, self._mount, self._links, length)
         sight.ahead = self._planned[1] - now + self._shift.value
+
+    def _magnet_at(self, time: float) -> np.ndarray:
+        """Return the magnet's place (3,) [m] on the path at `time` [s] of the scenario."""
+        guidance, length = self._guidance, self._parameters.magnet_length
+        motion = np.zeros_like(guidance.motion)
+        guidance.trajectory.write(time, motion)
+        return magnet_and_lever(motion[CHI], self._mount, self._links, length)[0]
+
+    def clear(self, chi: np.ndarray) -> np.ndarray:
+        """Return the way (3,) [m] from chi (6 + n,) up and away from a stand nearby, else zeros."""
+        p, way = self._parameters, np.zeros(3)
+        for stand in self._stands:
+            beside = chi[:Z] - stand
+            distance = max(float(np.hypot(*beside)), 1e-6)
+            if distance < p.clear_distance:
+                way[:Z] = (p.clear_distance / distance - 1.0) * beside
+                way[Z] = p.clear_height
+        return way

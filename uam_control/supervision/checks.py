@@ -31,7 +31,8 @@ class Check(NamedTuple):
     hold, land, failsafe: name of a parameter or of a limit in s that follows from parameters, or a
     number. in_flight: checked only while airborne.
     sign: -1 if a smaller value is worse. land_after, failsafe_after: names of the parameters with
-    the time beyond the limit before the reaction. reading: the value's name in `Readings`.
+    the time beyond the limit before the reaction. reading: the value's name in `Readings`. blind:
+    beyond the failsafe limit the vehicle still flies on the IMU for `blind_time`.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Check(NamedTuple):
     land_after: str = "land_after"
     failsafe_after: str = "failsafe_after"
     reading: str = ""
+    blind: bool = False
 
     @property
     def unit(self) -> str:
@@ -70,13 +72,14 @@ CHECKS = (
     Check("joint angle", "{name} at {value:.2f} of its limit", 1.0),
     Check("motion capture", "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
           "mocap_distance_hold", failsafe="mocap_distance_hold", in_flight=True,
-          failsafe_after="mocap_age_failsafe"),
+          failsafe_after="mocap_age_failsafe", blind=True),
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1,
           reading="battery"),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
-          failsafe="mocap_age_failsafe", reading="mocap_age"),
+          failsafe="mocap_age_failsafe", reading="mocap_age", blind=True),
     Check("mocap pose", "{name} has been the same for {value:.2f} s, {limit:g} s allowed",
-          "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True, reading="mocap_still"),
+          "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True, reading="mocap_still",
+          blind=True),
     Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold",
           reading="joint_age"),
     Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
@@ -104,6 +107,7 @@ LATE, LATE_LOOP, EFFORT, GAIN = (
     [check.name for check in CHECKS].index(it)
     for it in (SETPOINT_DELAY, LOOP_DELAY, "joint torque", "adapted gain")
 )
+BLIND = frozenset(check.name for check in CHECKS if check.blind)
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
 _SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
 _CHECKED = len(CHECKS)
@@ -112,11 +116,19 @@ readings_of = attrgetter(*(CHECKS[i].reading for i in _ROWS))
 
 
 class ExceededLimit(NamedTuple):
-    """A limit exceeded for its time: the reaction's level, the cause and the quantity's name."""
+    """A limit exceeded for its time: the reaction's level, the cause and the quantity's name.
+
+    Of two quantities at one level one that is not `blind` counts, then the first.
+    """
 
     level: Level
     cause: str
     name: str
+
+    @property
+    def blind(self) -> bool:
+        """See `Check`."""
+        return self.name in BLIND
 
 
 class Checks:
@@ -188,7 +200,8 @@ class Checks:
             if check.in_flight and not in_flight:
                 value = -math.inf
             level = monitor.update(stamp, value, limits, after, p.clear_after, p.hysteresis)
-            if level and (worst is None or level > worst.level):
+            rank = level, not check.blind
+            if level and (worst is None or rank > (worst.level, not worst.blind)):
                 cause = _cause(check, monitor.largest, limits[level - 1])
                 worst = ExceededLimit(level, cause, check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)

@@ -22,6 +22,7 @@ class State(Enum):
     HOLDING = "holding"
     LANDING = "landing"
     RELEASED = "released"
+    BLIND = "blind"
     FAILSAFE = "failsafe"
     DISARMED = "disarmed"
 
@@ -38,8 +39,13 @@ class Event(Enum):
     HOLD_LIMIT = "hold limit exceeded"
     LAND_LIMIT = "land limit exceeded"
     HARD_LIMIT = "failsafe limit exceeded"
+    BLIND_LIMIT = "failsafe limit of the motion capture exceeded"
     HARD_LIMIT_ON_GROUND = "failsafe limit exceeded on the ground"
     EXCEEDED_AGAIN = "hold limit exceeded after resumes_allowed resumes"
+    AGREES = "the failed quantity agrees again"
+    AGREES_TO_LAND = "the failed quantity agrees again, the landing goes on"
+    BLIND_TOO_LONG = "blind for blind_time"
+    DOWN = "landed, says the autopilot"
     HELD_TOO_LONG = "limit exceeded for hold_timeout"
     WAITED_TOO_LONG = "no command in time"
     CLEAR = "limit clear, when_clear: resume"
@@ -124,13 +130,30 @@ TRANSITIONS = (
     Transition(_S.RELEASED, _E.REGAINED, _S.HOLDING),
     Transition(_S.RELEASED, _E.REGAINED_ON_GROUND, _S.DISARMED),
     Transition(_S.RELEASED, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.BLIND_LIMIT, _S.BLIND),
+    Transition(_S.FLYING, _E.BLIND_LIMIT, _S.BLIND),
+    Transition(_S.HOLDING, _E.BLIND_LIMIT, _S.BLIND),
+    Transition(_S.LANDING, _E.BLIND_LIMIT, _S.BLIND),
+    Transition(_S.BLIND, _E.AGREES, _S.HOLDING),
+    Transition(_S.BLIND, _E.AGREES_TO_LAND, _S.LANDING),
+    Transition(_S.BLIND, _E.BLIND_TOO_LONG, _S.FAILSAFE),
+    Transition(_S.BLIND, _E.HARD_LIMIT, _S.FAILSAFE),
+    Transition(_S.BLIND, _E.LAND, _S.FAILSAFE),
+    Transition(_S.BLIND, _E.DOWN, _S.DISARMED),
+    Transition(_S.BLIND, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.BLIND, _E.RELEASED, _S.RELEASED),
+    Transition(_S.FAILSAFE, _E.AGREES, _S.HOLDING),
+    Transition(_S.FAILSAFE, _E.AGREES_TO_LAND, _S.LANDING),
+    Transition(_S.FAILSAFE, _E.DOWN, _S.DISARMED),
     Transition(_S.FAILSAFE, _E.DISARM, _S.DISARMED),
     Transition(_S.TAKING_OFF, _E.STOPPED, _S.DISARMED),
     Transition(_S.FLYING, _E.STOPPED, _S.DISARMED),
     Transition(_S.HOLDING, _E.STOPPED, _S.DISARMED),
     Transition(_S.LANDING, _E.STOPPED, _S.DISARMED),
     Transition(_S.RELEASED, _E.STOPPED, _S.DISARMED),
+    Transition(_S.BLIND, _E.STOPPED, _S.DISARMED),
     Transition(_S.FAILSAFE, _E.STOPPED, _S.DISARMED),
+    Transition(_S.FAILSAFE, _E.LOST_ARMING, _S.DISARMED),
 )
 TARGETS = {(source, event): target for source, event, target in TRANSITIONS}
 # causes in a flight without incidents
@@ -147,4 +170,6 @@ AIRBORNE_STATES = (
     State.HOLDING,
     State.LANDING,
     State.RELEASED,
+    State.BLIND,
+    State.FAILSAFE,
 )

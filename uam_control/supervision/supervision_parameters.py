@@ -133,6 +133,9 @@ class Reactions(ParameterSet):
     delay_after: float = number(
         1.0, "time of a measured loop delay beyond a limit before its reaction", "s", 0.0, 10.0
     )
+    blind_time: float = number(
+        1.5, "time without usable poses, on the IMU alone, before the failsafe", "s", 0.0, 5.0
+    )
     clear_after: float = number(
         1.0, "time within a limit, less the hysteresis, before it counts as clear", "s", 0.0, 60.0
     )

@@ -1,10 +1,11 @@
 """The supervisor: from observation and operator command to state and decision.
 
 It never arms by itself: `Decision.arm` becomes true by `start`, and false once after that. It
-leaves failsafe only by a command. It disarms on the ground, by a command in failsafe, after the
-autopilot has disarmed, or after a kill. In the air the last resort is failsafe, in which the
-autopilot descends without the companion. When somebody else takes control it releases the vehicle
-at once. It lands without a bridge that flies on.
+disarms on the ground, by a command in failsafe, after the autopilot has disarmed, or after a kill.
+Without usable poses it flies blind, on the IMU, for a short time; the last resort is failsafe, in
+which the autopilot descends without the companion. It holds again when the poses agree again, if
+the autopilot still follows it. When somebody else takes control it releases the vehicle at once. It
+lands without a bridge that flies on.
 """
 
 from __future__ import annotations
@@ -81,6 +82,9 @@ class Supervisor:
         self._lands = False  # whether the autopilot lands a released vehicle
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
+        self._failed = ""  # quantity whose failure made it blind, until it agrees again
+        self._blind_since = math.inf  # stamp [s]
+        self._interrupted = State.FLYING  # what it did before it became blind
         self._stamp = -math.inf
         self._holds = Holds()
         self._checks = Checks(parameters)
@@ -111,9 +115,6 @@ class Supervisor:
                 self._go(event, cause)
                 break
         self._was_armed = seen.armed
-        if self._arm and self.state is State.FAILSAFE and not seen.armed:
-            self._arm = False
-            self.decision = self._decide()
         return self.decision
 
     def _as_usual(self, seen: Observation) -> bool:
@@ -186,14 +187,15 @@ class Supervisor:
         """Return the decision for the state, by the policy of docs/supervision.md."""
         p, state = self._parameters, self.state
         guide, keep, stow = Guide.NOTHING, True, False
-        if state in (State.TAKING_OFF, State.FLYING) or self._planned:
+        landing = state is State.LANDING or (state is State.BLIND and self._lands_on)
+        if state in (State.TAKING_OFF, State.FLYING) or (self._planned and landing):
             guide = Guide.SCENARIO
-        elif state is State.HOLDING:
-            guide, keep = Guide.STOP, p.magnet_holding == "keep"
-            stow = p.arm_holding == "stow"
-        elif state is State.LANDING:
+        elif landing:
             guide, keep = Guide.DESCEND, p.magnet_landing == "keep"
             stow = p.arm_landing == "stow"
+        elif state in (State.HOLDING, State.BLIND):
+            guide, keep = Guide.STOP, p.magnet_holding == "keep"
+            stow = p.arm_holding == "stow"
         elif state is State.FAILSAFE:
             keep, stow = p.magnet_failsafe == "keep", p.arm_failsafe == "stow"
         elif state is State.DISARMED:
@@ -216,8 +218,8 @@ class Supervisor:
                 yield _planned(Event.TOUCHDOWN)
             still = self.state is State.TAKING_OFF
             when = "before it was airborne" if still else "in flight"
-            if self.state is State.RELEASED:
-                when = f"while released: {self.cause}"
+            if self.state in (State.RELEASED, State.FAILSAFE):
+                when = f"while {self.state.value}: {self.cause}"
             yield Event.LOST_ARMING, f"the autopilot disarmed {when}"
             if self._arm and self._was_armed:
                 yield Event.GIVEN_UP, "the autopilot disarmed before the take-off"
@@ -235,10 +237,18 @@ class Supervisor:
         late = finding is not None and finding.name == SETPOINT_DELAY
         if late and self._arm and self.state is State.GROUNDED:
             yield Event.GIVEN_UP, cause  # waiting does not make a link faster
+        if seen.authority.landed:
+            yield Event.DOWN, f"{self.cause}; {Event.DOWN.value}"
         if level is Level.FAILSAFE:
-            if seen.on_ground:
+            blind = finding.blind  # the estimate then says nothing about the ground
+            if seen.authority.landed if blind else seen.on_ground:
                 yield Event.HARD_LIMIT_ON_GROUND, cause
-            yield Event.HARD_LIMIT, cause
+            yield Event.BLIND_LIMIT if blind else Event.HARD_LIMIT, cause
+        if self._stamp - self._blind_since >= p.blind_time:
+            yield Event.BLIND_TOO_LONG, f"{self.cause}; blind for {p.blind_time:g} s"
+        follows = not (seen.authority.lands or seen.authority.landed or seen.authority.released_to)
+        if level is Level.FINE and self._failed and follows:
+            yield self._agrees(), f"{self._failed} agrees again"
         if command is not None and not self.refusal(command, seen):
             event = self._event(command, seen)
             if self.state is State.RELEASED:
@@ -289,13 +299,19 @@ class Supervisor:
     def _go(self, event: Event, cause: str) -> None:
         source, self.state = self.state, TARGETS[self.state, event]
         self.cause = cause
-        self._planned = event is Event.LANDING_DUE
+        self._blind_since = self._stamp if self.state is State.BLIND else math.inf
         finding = self._checks.finding
-        if self.state is State.HOLDING:
-            quantity = finding.name if event is Event.HOLD_LIMIT and finding else ""
-            self._holds.begin(self._stamp, event, quantity)
-        else:
-            self._holds.end(event)
+        if self.state is State.BLIND:  # it goes on with its landing, or its hold, afterwards
+            self._interrupted, self._failed = source, finding.name
+        elif self.state is not State.FAILSAFE:
+            self._planned = event is Event.LANDING_DUE
+            quantity = finding.name if event is Event.HOLD_LIMIT and finding else self._failed
+            held = self._failed and self._interrupted is State.HOLDING
+            self._failed = ""
+            if self.state is not State.HOLDING:
+                self._holds.end(event)
+            elif not held:
+                self._holds.begin(self._stamp, event, quantity)
         in_time = self._stamp - self._regained <= self._parameters.regain_timeout
         self._goes_on, self._regained = event is Event.REGAINED and in_time, -math.inf
         self._arm = self._arm and self.state is not State.DISARMED
@@ -310,6 +326,16 @@ class Supervisor:
             if cause != self.cause:
                 self.cause, self._regained = cause, -math.inf
                 self.decision = self._decide()
+
+    @property
+    def _lands_on(self) -> bool:
+        """Whether it became blind in a landing."""
+        return self._interrupted is State.LANDING
+
+    def _agrees(self) -> Event:
+        """Return the event of poses that agree again: a take-off given up, or a landing, lands."""
+        landing = self._interrupted in (State.TAKING_OFF, State.LANDING) and not self._planned
+        return Event.AGREES_TO_LAND if landing else Event.AGREES
 
     def _regain(self) -> None:
         """Ask for the released vehicle; the scenario goes on if it is regained in time."""

@@ -32,6 +32,7 @@ DOWN = _END - 1  # of `estimate`: velocity downwards
 HISTORY = 64  # samples of the estimate that are kept: a quarter of a second
 OLDEST = 0.2  # [s] age up to which the stamp of a pose is used
 VISION_TIMEOUT = 0.5  # s
+VELOCITY_VALID = 5.0  # s without vision, after which the vertical velocity is invalid (PX4)
 ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
 MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
 
@@ -44,7 +45,7 @@ _BIAS_WINDOW = 0.02  # m, a larger difference is a jump of vision and does not c
 _BIAS_MAX = 0.4  # m/s^2
 _LONGEST_PULL = 0.04  # s, longest interval used for the correction by one pose
 _FORCE_TIME = 0.2  # s, time constant of the mean specific force
-_VELOCITY_KEPT = 5.0  # s without vision, after which the next pose resets the velocity to 0
+_REST_TIME = 0.2  # s, time constant of the bias of a vehicle that stands
 
 
 def age_of(stamp: float, time: float) -> float:
@@ -113,6 +114,21 @@ def predict(
 
 
 @jit
+def rest(dt: float, arrays: EstimatorArrays) -> None:
+    """Correct by the knowledge that the vehicle stands, for dt [s]: no velocity, no acceleration.
+
+    PX4's update of zero velocity. Without it the bias of a vehicle that takes off is unknown.
+    """
+    estimate, bias = arrays.estimate, arrays.bias
+    force = rotate(matrix_from_quaternion(estimate[:_PLACE]), arrays.mean_force)
+    for i in range(3):
+        learnt = force[i] + (GRAVITY if i == 2 else 0.0) - bias[i]
+        changed = bias[i] + min(1.0, dt / _REST_TIME) * learnt
+        bias[i] = min(_BIAS_MAX, max(-_BIAS_MAX, changed))
+        estimate[_SPEED + i] = 0.0
+
+
+@jit
 def correct(
     position: np.ndarray,
     quaternion: np.ndarray,
@@ -161,7 +177,7 @@ def fuse(
     if gap > VISION_TIMEOUT:
         estimate[:_PLACE] = quaternion
         estimate[_PLACE:_SPEED] = position
-        if gap > _VELOCITY_KEPT:
+        if gap > VELOCITY_VALID:  # the next pose resets it
             estimate[_SPEED:] = 0.0
         return
     correct(position, quaternion, gap, estimate, arrays.bias)
@@ -220,10 +236,19 @@ class Estimator:
         still = np.zeros(3)
         self._fuse = prepared(fuse, still, still, 0.0, 0.0, 0.0, self._arrays)
         self._predict = prepared(predict, still, still, 0.0, 0.0, True, 0, self._arrays)
+        self._rest = prepared(rest, 0.0, self._arrays)
 
     def aided(self, time: float) -> bool:
         """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
         return time - self._vision_time < VISION_TIMEOUT
+
+    def sinks_known(self, time: float) -> bool:
+        """Whether the vertical velocity is valid at `time` [s]; see VELOCITY_VALID."""
+        return time - self._vision_time < VELOCITY_VALID
+
+    def stands(self, dt: float) -> None:
+        """Correct by the knowledge that the vehicle stands; dt [s]."""
+        self._rest(dt, self._arrays)
 
     def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> bool:
         """Advance by one sample and return `aided`.

@@ -282,6 +282,8 @@ class Autopilot:
         self.imu = gyro, accel
         commander, landing = self.commander, self.landing
         aided = self.estimator.predict(time, gyro, accel, dt)
+        if landing.landed:
+            self.estimator.stands(dt)
         self.battery.update(time, commander.armed)
         commander.update(time, landing.landed, self.battery.state)
         setpoint = self._setpoint
@@ -291,9 +293,9 @@ class Autopilot:
         if commander.armed and commander.mode is not Mode.OFFBOARD:
             setpoint, descending = self._own_setpoint(commander.mode, aided, dt)
         elif commander.armed and self._position is not None and not aided:
-            setpoint, descending = self._descent.update(self.estimator.estimate, dt), True
+            setpoint, descending = self._descend(dt), True
         else:
-            self._descent.integral = 0.0
+            self._descent.reset()
             self._position_modes.reset()
             if commander.armed and self._position is not None:
                 estimate = self.estimator.estimate
@@ -306,7 +308,7 @@ class Autopilot:
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
         if commander.stopped:
             self.motors[:] = 0.0
-        velocity = self._velocity if aided else None
+        velocity = self._velocity if self.estimator.sinks_known(time) else None
         landing.update(time, commander.armed, descending, float(setpoint[3]), self.rates, velocity)
         return self.motors
 
@@ -341,7 +343,13 @@ class Autopilot:
                 modes.reset()
                 setpoint[:] = 0.0
             return setpoint, modes.sinking
-        return self._descent.update(self.estimator.estimate, dt), True
+        return self._descend(dt), True
+
+    def _descend(self, dt: float) -> np.ndarray:
+        """Return the setpoint (4,) of the level descent."""
+        estimator = self.estimator
+        known = estimator.sinks_known(self._time)
+        return self._descent.update(estimator.estimate, dt, known, self.landing.contact)
 
     def _configure(self) -> None:
         p = self.parameters

@@ -19,12 +19,13 @@ _WIDER = 2.5  # factor on the motion thresholds while maybe landed (PX4)
 
 
 class LandDetector:
-    """`landed` is true on the ground and while disarmed; `maybe_landed` freezes the integrals."""
+    """`landed` is true on the ground and while disarmed; `maybe_landed` freezes the integrals;
+    `contact`: the ground is touched."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.landed = True
         self.maybe_landed = True
-        self._contact = True
+        self.contact = True
         self._since = [-math.inf, -math.inf, -math.inf]  # [s] begin of the evidence of each stage
         self.configure(parameters)
 
@@ -51,15 +52,14 @@ class LandDetector:
         """Update the stages with this tick's thrust command, body rates [rad/s], roll and pitch
         first, and velocity [m/s, NED].
 
-        velocity: None without vision. The integrated velocity drifts, and a drifting descent would
-        never count as landed: low thrust alone then means ground contact.
+        velocity: None where it is not valid: low thrust alone then means ground contact.
         """
         if not armed:
-            self._contact = self.maybe_landed = self.landed = True
+            self.contact = self.maybe_landed = self.landed = True
             return
         if thrust > self._low:  # as in all of a flight: no evidence of any stage
             self._since[:] = math.inf, math.inf, math.inf
-            self._contact = self.maybe_landed = self.landed = False
+            self.contact = self.maybe_landed = self.landed = False
             return
         wider = _WIDER if self.maybe_landed else 1.0
         contact = thrust <= self._low and (
@@ -69,7 +69,7 @@ class LandDetector:
         )
         still = math.hypot(rates[0], rates[1]) <= wider * self._rotation
         none = thrust <= (self._none_descending if descending else self._none)
-        since, reached = self._since, [self._contact, self.maybe_landed, self.landed]
+        since, reached = self._since, [self.contact, self.maybe_landed, self.landed]
         evidence = True
         for stage, condition in enumerate((contact, still and none, True)):
             if evidence and condition:
@@ -79,4 +79,4 @@ class LandDetector:
             else:
                 since[stage], evidence = math.inf, False
             reached[stage] = evidence
-        self._contact, self.maybe_landed, self.landed = reached
+        self.contact, self.maybe_landed, self.landed = reached

@@ -13,15 +13,22 @@ class Segment:
     """Quintic polynomials from a motion to rest at a goal, one duration per coordinate."""
 
     def __init__(
-        self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
+        self,
+        stamp: float,
+        start: np.ndarray,
+        goal: np.ndarray,
+        lengths: np.ndarray,
+        columns: slice = slice(None),
     ) -> None:
         """Begin at `stamp` [s] at start (3, 6 + n) or (5, 6 + n); end at goal (6 + n,), after
-        lengths (6 + n,) [s].
+        lengths (6 + n,) [s]; columns: those that move.
         """
-        self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
+        self._stamp, self._columns = stamp, columns
+        self._lengths, self._goal = lengths[columns], goal[columns].copy()
+        start = start[:, columns]
         rest = np.zeros_like(start)
-        rest[CHI] = goal
-        self._powers = quintic(start, rest, lengths)
+        rest[CHI] = self._goal
+        self._powers = quintic(start, rest, self._lengths)
 
     @property
     def end(self) -> float:
@@ -30,6 +37,7 @@ class Segment:
 
     def write(self, stamp: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n) at `stamp` [s]."""
+        motion = motion[:, self._columns]
         u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
         motion[:] = quintic_at(self._powers, u, self._lengths)
         arrived = u >= 1.0  # without rounding errors

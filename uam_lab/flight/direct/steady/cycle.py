@@ -53,7 +53,7 @@ class CyclePart:
             and autopilot._desired is None
             and autopilot._time is not None
             and not p["SIM_BAT_ENABLE"]
-            and not (landing._contact or landing.maybe_landed or landing.landed)
+            and not (landing.contact or landing.maybe_landed or landing.landed)
             and commander._flew
             and commander._landed_at is None
         )
