@@ -15,30 +15,38 @@ import pytest
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_control.supervision import Event
+from uam_control.supervision import Event, State
 from uam_lab.campaign.fault_outcome import classify
 from uam_lab.cli.main import main
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
+from uam_lab.results.outcome import transitions
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 SCENARIO = load_scenario("hover")
+QUICK_PICK = load_scenario("quick_pick")
 
 
-def flown(*texts, seed=1, plant="calm", watch=None):
-    """A hover with faults: flight, series, metrics.
+def flown(*texts, seed=1, plant="calm", watch=None, scenario=SCENARIO):
+    """A flight with faults: flight, series, metrics.
 
     plant: name of a preset; watch(flight): called once a second.
     """
-    faults = read_schedule(texts, SCENARIO, seed)
+    faults, payload = read_schedule(texts, scenario, seed), scenario.payload_mass
     vehicle = Vehicle.load().changed(presets.added({}, presets.read([plant])))
-    flight = DirectFlight(SCENARIO, load_profile("s500"), vehicle, 0.0, seed, faults)
+    flight = DirectFlight(scenario, load_profile("s500"), vehicle, payload, seed, faults)
     flight.run(watch and (lambda time, phase: watch(flight)))
     series = flight.recording.series()
     reason = flight.mission.output.abort_reason or flight.ended_by
-    info = {"abort_reason": reason, "faults": flight.fault_records, "payload_mass_kg": 0.0}
+    info = {
+        "abort_reason": reason,
+        "faults": flight.fault_records,
+        "payload_mass_kg": payload,
+        "drop_point": scenario.drop_point,
+        "transitions": transitions(flight.mission.changes),
+    }
     return flight, series, metrics.compute(series, info)
 
 
@@ -99,10 +107,39 @@ def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
         assert figures["shortfalls"], text
         height, speed = flight.plant.truth().state[:2, 2]
         assert height < 0.3 and abs(speed) < 0.05, text  # on its legs the base is at 0.285 m
-        # Without a link the mission detects the touchdown by the estimate. The flight then ends
-        # before the autopilot disarms itself.
-        assert flight.armed == (text.startswith("mavlink_cut"))
+        assert not flight.armed, text
+    # without a link the mission detects the touchdown by the estimate
     assert flight.mission.changes[-1].event is Event.TOUCHDOWN
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["mocap_dropout@pick+2.2+1.15", "mocap_freeze@pick+2.2+1.15", "mocap_jump@pick+2.2+1.15:x=0.3"],
+)
+def test_poses_that_are_back_just_after_the_failsafe_limit_complete_the_mission(text):
+    flight, _, figures = flown(text, scenario=QUICK_PICK)
+    assert figures["mission_completed"], figures["shortfalls"]
+    states = [change.target for change in flight.mission.changes]
+    assert State.BLIND in states and State.FAILSAFE not in states
+
+
+@pytest.mark.parametrize("text", ["mocap_dropout@pick+2.2", "mocap_freeze@carry+0.5"])
+def test_without_poses_it_leaves_the_stand_before_the_autopilot_descends(text):
+    flight, series, figures = flown(text, scenario=QUICK_PICK)
+    assert classify(series, figures) == "failsafe" and not flight.armed
+    low = series["truth.z"] < 0.7
+    beside = np.hypot(series["truth.x"] + 0.789, series["truth.y"])[low & (series.time > 5.0)]
+    assert beside.min() > 0.3
+    assert np.abs(series["truth.pitch"]).max() < 0.35
+
+
+@pytest.mark.parametrize("text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4"])
+@pytest.mark.parametrize("seed", [1, 2, 6])
+def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
+    flight, series, figures = flown(text, seed=seed)
+    assert classify(series, figures) == "failsafe" and not flight.armed
+    up = series["truth.z"] - series["truth.z"][0] > 0.02
+    assert np.count_nonzero(np.diff(up.astype(int)) == 1) == 1  # one lift-off
 
 
 def test_late_poses_do_no_harm():
@@ -238,7 +275,11 @@ def test_a_link_that_becomes_slower_than_the_margin_is_left_before_the_vehicle_s
     assert "setpoint delay" in flight.mission.output.abort_reason
     left = series.time < 6.0  # in the autopilot's hands after that
     tilt = np.hypot(series["truth.roll"][left], series["truth.pitch"][left])
-    assert tilt.max() < 0.1 and (flight.mission.changes[-1].event is Event.HARD_LIMIT)
+    assert tilt.max() < 0.1
+    assert [change.event for change in flight.mission.changes[-2:]] == [
+        Event.HARD_LIMIT,
+        Event.DOWN,
+    ]
 
 
 @pytest.mark.parametrize("plant", ["calm", "laboratory"])

@@ -139,7 +139,7 @@ def test_without_mocap_it_holds_on_the_imu_then_the_autopilot_brings_it_down():
 
     made.plant.observe = blind
     output = until(made, lambda o: o.done)
-    assert states(made)[-2:] == [State.HOLDING, State.FAILSAFE]
+    assert states(made)[-4:] == [State.HOLDING, State.BLIND, State.FAILSAFE, State.DISARMED]
     assert output.abort_reason.startswith("mocap pose is 1.") and output.phase == "aborted"
     assert not made.armed and not output.arm
     x, y = landed_softly(made)

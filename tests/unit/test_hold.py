@@ -66,9 +66,9 @@ def test_the_last_setpoints_do_not_turn_it():
 
 def test_without_hope_it_ends_sooner():
     hold = flown()
-    assert hold.setpoint(4.0, TILTED, UNKNOWN, hopeless=True) is not None
-    assert hold.setpoint(4.99, TILTED, UNKNOWN, hopeless=True) is not None
-    assert hold.setpoint(5.01, TILTED, UNKNOWN, hopeless=True) is None
+    assert hold.setpoint(4.0, TILTED, UNKNOWN, 1.0) is not None
+    assert hold.setpoint(4.99, TILTED, UNKNOWN, 1.0) is not None
+    assert hold.setpoint(5.01, TILTED, UNKNOWN, 1.0) is None
 
 
 def test_thrust_is_an_average_not_the_last_value():

@@ -76,7 +76,7 @@ def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
     flying, tau_p, tau_q, situation
 ):
     source, state = in_flight(), state_at(1.0, roll=0.1)
-    held = HoldParameters().release_time if situation.let_go else HoldParameters().hold_time
+    held = HoldParameters().level_time if situation.let_go else HoldParameters().hold_time
     for k in range(round((held + 0.5) / TICK)):
         now = 1.0 + TICK * (k + 1)
         source.note_state(now, state)

@@ -32,7 +32,6 @@ DOWN = _END - 1  # of `estimate`: velocity downwards
 HISTORY = 64  # samples of the estimate that are kept: a quarter of a second
 OLDEST = 0.2  # [s] age up to which the stamp of a pose is used
 VISION_TIMEOUT = 0.5  # s
-VELOCITY_VALID = 5.0  # s without vision, after which the vertical velocity is invalid (PX4)
 ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
 MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
 
@@ -45,6 +44,7 @@ _BIAS_WINDOW = 0.02  # m, a larger difference is a jump of vision and does not c
 _BIAS_MAX = 0.4  # m/s^2
 _LONGEST_PULL = 0.04  # s, longest interval used for the correction by one pose
 _FORCE_TIME = 0.2  # s, time constant of the mean specific force
+_VELOCITY_KEPT = 5.0  # s without vision, after which the next pose resets the velocity to 0
 _REST_TIME = 0.2  # s, time constant of the bias of a vehicle that stands
 
 
@@ -177,7 +177,7 @@ def fuse(
     if gap > VISION_TIMEOUT:
         estimate[:_PLACE] = quaternion
         estimate[_PLACE:_SPEED] = position
-        if gap > VELOCITY_VALID:  # the next pose resets it
+        if gap > _VELOCITY_KEPT:
             estimate[_SPEED:] = 0.0
         return
     correct(position, quaternion, gap, estimate, arrays.bias)
@@ -242,9 +242,9 @@ class Estimator:
         """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
         return time - self._vision_time < VISION_TIMEOUT
 
-    def sinks_known(self, time: float) -> bool:
-        """Whether the vertical velocity is valid at `time` [s]; see VELOCITY_VALID."""
-        return time - self._vision_time < VELOCITY_VALID
+    def unaided_for(self, time: float) -> float:
+        """Return the time [s] since the last vision pose at `time` [s]."""
+        return time - self._vision_time
 
     def stands(self, dt: float) -> None:
         """Correct by the knowledge that the vehicle stands; dt [s]."""

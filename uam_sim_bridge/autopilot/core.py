@@ -308,7 +308,9 @@ class Autopilot:
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
         if commander.stopped:
             self.motors[:] = 0.0
-        velocity = self._velocity if self.estimator.sinks_known(time) else None
+        velocity = self._velocity
+        if not aided:  # across, the IMU alone is soon wrong
+            velocity = (0.0, 0.0, velocity[2]) if self._sink_known(time) else None
         landing.update(time, commander.armed, descending, float(setpoint[3]), self.rates, velocity)
         return self.motors
 
@@ -347,9 +349,11 @@ class Autopilot:
 
     def _descend(self, dt: float) -> np.ndarray:
         """Return the setpoint (4,) of the level descent."""
-        estimator = self.estimator
-        known = estimator.sinks_known(self._time)
-        return self._descent.update(estimator.estimate, dt, known, self.landing.contact)
+        known, contact = self._sink_known(self._time), self.landing.contact
+        return self._descent.update(self.estimator.estimate, dt, known, contact)
+
+    def _sink_known(self, time: float) -> bool:
+        return self.estimator.unaided_for(time) < self.parameters["EKF2_NOAID_TOUT"] * 1e-6
 
     def _configure(self) -> None:
         p = self.parameters

@@ -101,6 +101,9 @@ DEFINITIONS: dict[str, Definition] = {
     "COM_KILL_DISARM": Definition(5.0, 0.0, 30.0, "s", "disarm after the kill switch"),
     "RC_MAP_KILL_SW": Definition(0, 0, 18, "1", "channel of the kill switch; 0 none", True),
     "RC_KILLSWITCH_TH": Definition(0.75, 0.0, 1.0, "1", "share of the channel that engages it"),
+    "EKF2_NOAID_TOUT": Definition(
+        5e6, 5e5, 1e7, "us", "time without vision, then the vertical velocity is not valid", True
+    ),
     "COM_DISARM_LAND": Definition(2.0, -1.0, 20.0, "s", "disarm after landing; <= 0 never"),
     "COM_DISARM_PRFLT": Definition(10.0, -1.0, 200.0, "s", "disarm without take-off; <= 0 never"),
     "LNDMC_TRIG_TIME": Definition(1.0, 0.1, 10.0, "s", "time until landed is reported"),

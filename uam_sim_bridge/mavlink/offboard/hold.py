@@ -32,10 +32,13 @@ class HoldParameters(ParameterSet):
     )
     release_time: float = number(
         1.0,
-        "the same where no commands are to be expected: no estimate, or the mission has given up",
+        "the same without an estimate",
         "s",
         0.0,
         10.0,
+    )
+    level_time: float = number(
+        0.4, "the same in the mission's failsafe: the autopilot takes over level", "s", 0.0, 10.0
     )
     hold_gain: float = number(6.0, "tilt → body rate while holding level", "1/s", 0.0, 20.0)
     hold_integral: float = number(
@@ -109,21 +112,21 @@ class LevelHold:
         self._thrust = self._since = None
 
     def setpoint(
-        self, time: float, attitude: np.ndarray, velocity: np.ndarray, hopeless: bool = False
+        self, time: float, attitude: np.ndarray, velocity: np.ndarray, longest: float | None = None
     ) -> Desired | None:
         """Return body rates, attitude and thrust at `time` [s]; None: the stream must stop.
 
         attitude (3,): roll, pitch, yaw [rad], FLU in ENU; an axis that is not finite gets rate 0.
-        velocity (3,): [m/s], ENU; a component that is not finite is not braked. hopeless: no
-        commands are expected, so `release_time` applies instead of `hold_time`.
+        velocity (3,): [m/s], ENU; a component that is not finite is not braked. longest [s]:
+        in place of `hold_time`.
         """
         if self._thrust is None:
             return None
         if self._since is None:
             self._since = self._time = time
             self._integral[:], self._desired[CHI, Z] = 0.0, self._yaw
-        longest = self.parameters.release_time if hopeless else self.parameters.hold_time
-        remaining = longest - (time - self._since)
+        allowed = self.parameters.hold_time if longest is None else longest
+        remaining = allowed - (time - self._since)
         dt, self._time = max(0.0, time - self._time), time
         if remaining < 0.0:
             return None

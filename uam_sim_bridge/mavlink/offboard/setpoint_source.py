@@ -11,8 +11,8 @@ without commands, or in the air before the first flight, none |
 | after a gap in which the autopilot's failsafe began | none until its reports are new, and on \
 the ground none: it lands and disarms |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
-`hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
-failsafe acts |
+`hold_time` (`release_time` without an estimate, `level_time` in failsafe), then no setpoint: the \
+autopilot's failsafe acts |
 """
 
 from __future__ import annotations
@@ -163,9 +163,14 @@ class SetpointSource:
             return self._at_present(now)
         if not armed or (landed and not high):
             return self._idle
-        hopeless = let_go or not self._fresh(self._estimated, now)
-        velocity = UNKNOWN if hopeless else self._motion[CHI_DOT, POSITION]
-        desired = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
+        velocity, longest, p = UNKNOWN, None, self._hold.parameters
+        if let_go:
+            longest = p.level_time
+        elif not self._fresh(self._estimated, now):
+            longest = p.release_time
+        else:
+            velocity = self._motion[CHI_DOT, POSITION]
+        desired = self._hold.setpoint(now, self._attitude(now), velocity, longest)
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
         return None if desired is None else self._type(desired)
