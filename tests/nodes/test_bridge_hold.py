@@ -75,6 +75,7 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
     stopped, thrusts, rolls = rig.count, [], []
     tilted = np.zeros((3, 8))
     tilted[0, 3] = 0.1  # roll [rad], without a reaction of the controllers
+    tilted[0, 2] = 5.0  # as `fly`; low, the autopilot would be left to land
 
     def tick():
         rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, tilted))
@@ -105,6 +106,7 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
 def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
     """Ticks stop in flight: the bridge sends level setpoints for release_time, then none."""
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "release_time:=3.0")
+    rig.autopilot.set_parameter("COM_OF_LOSS_T", 30.0)
     rig.fly()
     before = len(rig.node.output)  # a stalled flight has such lines, too
     rig.receive()
@@ -127,6 +129,7 @@ def test_without_states_it_levels_by_the_motion_capture(make_rig):
     """Without the estimator the bridge levels by the attitude of the motion capture."""
     level = ("-p", "hold_gain:=3.0", "-p", "hold_integral:=0.0", "-p", "release_time:=3.0")
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", *level)
+    rig.autopilot.set_parameter("COM_OF_LOSS_T", 30.0)
     rig.fly()
     pose, tilted = PoseWriter(), quaternion_from_euler(np.array([0.1, 0.0, 0.0]))
     rig.receive()

@@ -54,7 +54,7 @@ def test_parameters_of_px4_are_checked_before_the_flight(px4_build):
 
 def test_a_signing_key_for_px4_is_refused(px4_build):
     key = {"mavlink_bridge": {"signing_key": "0f" * 32}}
-    with pytest.raises(SettingsError, match="PX4 v1.16 has no MAVLink signing") as error:
+    with pytest.raises(SettingsError, match="PX4 v1.16 and v1.17 have no MAVLink") as error:
         settings(autopilot="px4", px4_dir=px4_build, parameters=key)
     assert "0f" * 32 not in str(error.value)
 

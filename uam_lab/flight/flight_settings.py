@@ -245,8 +245,8 @@ def settings(
         )
     if px4 is not None and (parameters or {}).get("mavlink_bridge", {}).get("signing_key"):
         raise SettingsError(
-            "signing_key of mavlink_bridge: PX4 v1.16 has no MAVLink signing, the bridge would "
-            "refuse all its messages; leave it out"
+            "signing_key of mavlink_bridge: PX4 v1.16 and v1.17 have no MAVLink signing, v1.18 in "
+            "software has no key: the bridge would refuse all messages; leave it out"
         )
     px4_parameters.parse(px4_params, None if px4 is None else px4.ranges())
     link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)

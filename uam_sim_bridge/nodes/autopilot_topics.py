@@ -93,7 +93,7 @@ def comparison(watch: ParameterWatch) -> ParameterComparison:
     """Return the comparison of the autopilot's parameters with the required ones."""
     return ParameterComparison(
         sum(name in watch.values for name in watch.required),
-        len(watch.required),
+        len(watch.expected),
         watch.complete,
         tuple(ParameterDifference(*difference) for difference in watch.differences),
     )

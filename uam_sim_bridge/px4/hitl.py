@@ -51,7 +51,9 @@ def loop_values(
     """Return the parameters of PX4 in the loop: outputs, and no simulated battery unless given."""
     motors, output = parameters.motor_outputs(vehicle), parameters.output
     others = {output(FIRST_OF_SET + n): ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)}
-    defaults = {"SIM_BAT_ENABLE": 0, "IMU_INTEG_RATE": 250}
+    defaults = {"IMU_INTEG_RATE": 250}
+    if not {"SIM_BAT_ENABLE", "SIM_BAT_DRAIN"} & values.keys():
+        defaults |= {"SIM_BAT_ENABLE": 0, "SIM_BAT_DRAIN": 0}  # the second: PX4 v1.18
     return motors | others | defaults | dict(values) | {"SYS_HITL": 1, parameters.SYSTEM: 1}
 
 

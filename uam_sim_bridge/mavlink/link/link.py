@@ -42,8 +42,9 @@ from uam_sim_bridge.mavlink.transport.transport import Transport
 HEARTBEAT_PERIOD = 1.0  # s
 LOSS_TIME = 1.0  # s, PX4's COM_OF_LOSS_T until it has been read
 UNSIGNED = (
-    "the autopilot does not sign its messages, and signing_key is set: all are refused. PX4 v1.16 "
-    "has no MAVLink signing: start without signing_key, on a link that nobody else reaches"
+    "the autopilot does not sign its messages, and signing_key is set: all are refused. PX4 has "
+    "MAVLink signing from v1.18 on, with a key: start without signing_key, on a link that nobody "
+    "else reaches"
 )
 # other components of the vehicle, as a gimbal, send these, too, with other meaning
 OF_AUTOPILOT = {

@@ -54,6 +54,7 @@ LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OF
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
 ARMING_UNDERWAY = 2.0  # s after a request to arm in which the autopilot may still obey it
 NEW_REPORTS = 0.6  # s after a gap until each report is new: PX4 sends its mode twice a second
+OLD_TICKS = 0.2  # s of ticks that wait for a process that has not run
 FORCED = 5.0  # s after a kill: disarmed by force, as PX4 does (COM_KILL_DISARM); it may lie tilted
 KILLED = "kill engaged"  # PX4's text; the heartbeat, once a second, misses a short kill
 BY_SWITCH = "the pilot's kill switch has stopped the motors"
@@ -182,6 +183,7 @@ class OffboardSequence:
         self._person = False  # a person has chosen the mode of the released vehicle
         self._begun = -math.inf  # [s] the last tick that began
         self._resumed = -math.inf  # [s] newest end of a gap of the stream
+        self._current = -math.inf  # [s] until when ticks may be those of before a gap
         self._stop: Request | None = None  # repeated until the vehicle is disarmed
         self._halted = math.inf  # [s] since when
         self._time = 0.0  # [s] of the last update
@@ -246,14 +248,16 @@ class OffboardSequence:
         """Begin the tick `time` [s], before its setpoint is made.
 
         loss_time [s]: without setpoints until the autopilot's failsafe begins; frozen [s]: for how
-        long this process has not run, by another clock than that of the ticks, which may be late.
+        long this process has not run, by another clock than that of the ticks: old ticks may come
+        first. If none is missing after them, the time of the ticks stood still, too.
         """
-        if self.phase is Phase.FLYING and not self.let_go:
-            if max(time - self._streamed, frozen) > loss_time:
-                self._stream_lost = self._resumed = time
-                self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
-        elif self.withheld and max(time - self._begun, frozen) > loss_time:
+        if self.phase is Phase.FLYING and not self.let_go and time - self._streamed > loss_time:
+            self._stream_lost = self._resumed = time
+            self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
+        elif self.withheld and time - self._begun > loss_time:
             self._resumed = time
+        if frozen > loss_time:
+            self._current = time + OLD_TICKS
         self._begun = time
 
     @property
@@ -262,7 +266,8 @@ class OffboardSequence:
 
         The autopilot returns to OFFBOARD with the first setpoint: the vehicle may stand by now.
         """
-        return self.phase is Phase.RELEASED and self._begun - self._resumed < NEW_REPORTS
+        new = self._begun - self._resumed >= NEW_REPORTS
+        return self._begun < self._current or (self.phase is Phase.RELEASED and not new)
 
     @property
     def after_loss(self) -> bool:

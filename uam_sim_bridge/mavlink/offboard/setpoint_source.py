@@ -126,7 +126,7 @@ class SetpointSource:
         now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
         [N m, FLU], None for idle; attitude, reference (3, 3): see `Desired`.
         """
-        if situation.let_go or situation.stopped:
+        if situation.let_go or situation.stopped or situation.withheld:
             return self.without(now, situation)
         if situation.released:
             return self._present(now, situation)

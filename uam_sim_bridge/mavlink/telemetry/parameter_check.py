@@ -98,7 +98,7 @@ class ParameterWatch:
     ) -> None:
         self.warnings: tuple[str, ...] = ()
         self.required = RequiredParameters() if required is None else required
-        self._reader = ParameterReader((*WATCHED, *self.required))
+        self._reader = ParameterReader((*WATCHED, *self.required), self.required.instead)
         self.values = self._reader.values
         self._mapping = mapping
         self.writing, self.written = False, ()
@@ -126,6 +126,12 @@ class ParameterWatch:
     def complete(self) -> bool:
         """Return whether nothing is waited for: all received, or ATTEMPTS requests in vain."""
         return self._reader.complete
+
+    @property
+    def expected(self) -> list[str]:
+        """Return the required parameters that this autopilot has, or should have."""
+        waited = set(self._reader.missing)
+        return [name for name in self.required if name in self.values or name in waited]
 
     @property
     def differences(self) -> tuple[Difference, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2
 
@@ -43,7 +43,9 @@ class ParameterReader:
     """`values`: received parameters by name; `types`: their MAV_PARAM_TYPE; `given_up`: ATTEMPTS
     requests of the rest failed."""
 
-    def __init__(self, names: Iterable[str]) -> None:
+    def __init__(self, names: Iterable[str], instead: Mapping[str, str] | None = None) -> None:
+        """instead: name → other one; a name is not waited for once the other has come."""
+        self._instead = dict(instead or {})
         self.names = tuple(dict.fromkeys(names))
         self.values: dict[str, float] = {}
         self.types: dict[str, int] = {}
@@ -59,7 +61,8 @@ class ParameterReader:
     @property
     def missing(self) -> list[str]:
         """Return the names without a value."""
-        return [name for name in self.names if name not in self.values]
+        values, instead = self.values, self._instead
+        return [n for n in self.names if n not in values and instead.get(n) not in values]
 
     @property
     def complete(self) -> bool:

@@ -1,7 +1,8 @@
 """Values that the autopilot's parameters must have: rules from a file, and the differences.
 
 config/px4/vehicle.yaml: sections of `NAME: {rule, why}`. The rules: is, one_of, least, most, bits;
-`optional: true` beside a rule: an autopilot without this parameter passes.
+`optional: true` beside a rule: an autopilot without this parameter passes. `instead: OTHER`: so
+does one with the other parameter, as versions of PX4 that renamed it.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Rule:
     """What a parameter must be, and why.
 
     values: allowed ones, () for any; least, most: limits, both allowed; bits: all must be set;
-    optional: an autopilot without this parameter passes.
+    optional: an autopilot without this parameter passes; instead: so does one with that parameter.
     """
 
     why: str
@@ -50,6 +51,7 @@ class Rule:
     most: float = math.inf
     bits: int = 0
     optional: bool = False
+    instead: str = ""
 
     def met(self, value: float) -> bool:
         """Return whether the value meets the rule, to the accuracy of 32-bit numbers."""
@@ -120,15 +122,28 @@ class RequiredParameters(dict[str, Rule]):
         return tuple(
             Difference(name, values.get(name), rule.required, rule.why)
             for name, rule in self.items()
-            if (not rule.met(values[name]) if name in values else unanswered and not rule.optional)
+            if (
+                not rule.met(values[name])
+                if name in values
+                else unanswered and not rule.optional and rule.instead not in values
+            )
         )
+
+    @property
+    def instead(self) -> dict[str, str]:
+        """Return name → parameter that other versions have in its place."""
+        return {name: rule.instead for name, rule in self.items() if rule.instead}
 
 
 def _rule(entry: Any) -> Rule:
     """Return the rule of an entry of the file; raises ValueError."""
     if not isinstance(entry, dict) or not isinstance(entry.get("why"), str):
         raise ValueError("{rule, why: text} expected")
-    given = {key: value for key, value in entry.items() if key not in ("why", "optional")}
+    beside = "why", "optional", "instead"
+    given = {key: value for key, value in entry.items() if key not in beside}
+    instead = entry.get("instead", "")
+    if not isinstance(instead, str):
+        raise ValueError(f"instead: {instead!r}; the name of a parameter is allowed")
     optional = entry.get("optional", False)
     if not isinstance(optional, bool):
         raise ValueError(f"optional: {optional!r}; true and false are allowed")
@@ -157,6 +172,7 @@ def _rule(entry: Any) -> Rule:
         given.get("most", math.inf),
         bits,
         optional,
+        instead,
     )
     if rule.least > rule.most:
         raise ValueError(f"least {rule.least:g} is above most {rule.most:g}")
