@@ -17,6 +17,7 @@ EXAMPLES = """\
 examples:
   uam report results/latest                rebuild everything from its log.mcap, also after a flight
                                            that was killed
+  uam report results/latest --ulog a.ulg   with the log of PX4 beside ours
   uam report results/latest --out again    write to another folder
   uam report results/a results/b           both flights in the same figures
 """
@@ -37,6 +38,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     text = "result folder (default: the given one; for several flights results/<time>-report)"
     command.option("--out", "DIR", text, type=Path)
     command.option("--scenario", "NAME|FILE", "the flown scenario, for a log without one")
+    text = "log of PX4 to show beside ours (default: px4.ulg of the folder); needs pyulog"
+    command.option("--ulog", "FILE", text, type=Path)
     command.switch("--no-video", "leave out the video, which takes longest")
     command.switch("--no-pictures", "leave out snapshots and video")
 
@@ -66,7 +69,9 @@ def one(options: argparse.Namespace) -> int:
     console = Terminal()
     pictures = not options.no_pictures
     with reporting(console) as show:
-        report = build_report(out, show, video=not options.no_video, pictures=pictures)
+        report = build_report(
+            out, show, video=not options.no_video, pictures=pictures, ulog=options.ulog
+        )
     console.print(summary(metrics, out))
     for note in [*_notes(out), report.problem]:
         if note:

@@ -18,12 +18,13 @@ from pathlib import Path
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.stability import Stability, analyse_folder
+from uam_lab.report.facts import px4_log
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
 from uam_lab.report.video.flight_video import Rendering
 from uam_lab.results import timeseries
-from uam_lab.results.result_folder import write_json
+from uam_lab.results.result_folder import PX4_LOG, write_json
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,14 @@ def build_report(
     progress: Callable[[str], None] = lambda text: None,
     video: bool = True,
     pictures: bool = True,
+    ulog: Path | None = None,
 ) -> Report:
     """Make the report of the flight in a result folder.
 
     Requires timeseries.parquet and metrics.json; uses info.json, parameters.yaml and versions.json
-    if they exist. progress: called with a short text at the start of each step. Raises
-    timeseries.UnreadableFlight. A missing renderer is no error: see Report.problem.
+    if they exist. progress: called with a short text at the start of each step. ulog: of PX4
+    (default: px4.ulg of the folder, if it is there). Raises timeseries.UnreadableFlight. A missing
+    renderer is no error: see Report.problem.
     """
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
@@ -53,12 +56,34 @@ def build_report(
         # the pictures take longest; they are rendered while this process draws the figures
         rendering = stack.enter_context(Rendering(directory, video)) if pictures else None
         progress("stability")
-        flight = DrawnFlight(label, series, stability_of(directory, series))
+        px4, without = px4_log_of(directory, series, ulog)
+        flight = DrawnFlight(label, series, stability_of(directory, series), px4)
         figures.draw([flight], directory / "figures", progress)
         rendered = rendering.result(progress) if rendering else None
     progress("page")
     written = flight_page.write_page(directory, rendered)
-    return Report(written, rendered.problem if rendered else "")
+    problems = filter(None, (rendered.problem if rendered else "", without))
+    return Report(written, "; ".join(problems))
+
+
+def px4_log_of(
+    directory: Path, series: timeseries.Series, ulog: Path | None = None
+) -> tuple[px4_log.Px4Log | None, str]:
+    """Return PX4's log, and one line about why there is none, "" if there need not be one.
+
+    Raises UnreadableUlog and OSError for a `ulog` that was given.
+    """
+    file = ulog or directory / PX4_LOG
+    if ulog is None and not file.exists():
+        return None, ""
+    try:
+        return px4_log.read(file, series), ""
+    except ImportError:
+        return None, px4_log.MISSING
+    except (px4_log.UnreadableUlog, OSError) as error:
+        if ulog is not None:
+            raise
+        return None, str(error)
 
 
 def stability_of(directory: Path, series: timeseries.Series) -> Stability | None:

@@ -22,6 +22,7 @@ from uam_lab.results.metrics import plain
 
 RESULTS = Path("results")
 LATEST = "latest"
+PX4_LOG = "px4.ulg"  # of a flight with PX4 in software
 # Distributions whose version can change a flight or its results.
 DISTRIBUTIONS = (
     "uam",

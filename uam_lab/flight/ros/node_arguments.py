@@ -16,7 +16,7 @@ from uam_lab.flight.conclude import settings_facts
 from uam_lab.flight.flight_settings import AUTOPILOT_IMU, BUILTIN, FlightSettings
 from uam_lab.flight.node_options import EVERY_NODE
 from uam_lab.recording import log_facts
-from uam_lab.results.result_folder import ResultFolder, as_json, versions
+from uam_lab.results.result_folder import PX4_LOG, ResultFolder, as_json, versions
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
@@ -41,7 +41,6 @@ MODULES = {
 FUSED = "uam_sim_bridge.nodes.flight_controller"  # module of the nodes wiring.FUSED in one process
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
-PX4_LOG = "px4.ulg"  # in the result folder
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
 REQUIRED = "px4_parameters.yaml"

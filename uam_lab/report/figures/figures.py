@@ -19,6 +19,7 @@ from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
+from uam_lab.report.figures.px4_figure import px4_log
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
 from uam_lab.results import metrics
 from uam_lab.results.timeseries import AXES, SUBSYSTEMS
@@ -230,6 +231,11 @@ FIGURES: dict[str, tuple[Callable[[Sequence[DrawnFlight]], Figure | None], str]]
         setpoints,
         "Body rates and collective thrust sent to the autopilot; ratio of the true thrust to that "
         "of the assumed thrust curve, as identified in flight.",
+    ),
+    "px4_log": (
+        px4_log,
+        "What PX4 logged (ULog) beside our log, in our frames; the clocks are aligned by the "
+        "setpoints. PX4 logs them at its own, lower rate.",
     ),
 }
 

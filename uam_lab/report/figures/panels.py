@@ -18,6 +18,7 @@ from uam_lab.results.timeseries import ON_GROUND, Series
 
 if TYPE_CHECKING:
     from uam_lab.analysis.stability import Stability
+    from uam_lab.report.facts.px4_log import Px4Log
 
 BUCKETS = 900  # about one per pixel column of a panel
 RIGHT = 0.985  # right edge of the panels as part of the width
@@ -34,11 +35,12 @@ MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 @dataclass(frozen=True)
 class DrawnFlight:
-    """A flight to draw: name in the legend, series, stability analysis if there is one."""
+    """A flight to draw: name in the legend, series; stability analysis and PX4's log, if any."""
 
     label: str
     series: Series
     stability: Stability | None = None
+    px4: Px4Log | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.video.flight_video import Rendered, existing
 from uam_lab.results import templates
 from uam_lab.results.atomic import write_text
-from uam_lab.results.result_folder import read_json
+from uam_lab.results.result_folder import PX4_LOG, read_json
 
 PAPER_SCENARIO = "pick_and_place"
 FACTS = (
@@ -31,7 +31,7 @@ FACTS = (
 
 FILES = (
     ("log.mcap", "the log of all topics, a bag of ROS 2"),
-    ("px4.ulg", "the log of PX4"),
+    (PX4_LOG, "the log of PX4"),
     ("timeseries.parquet", "one row per control tick"),
     ("metrics.json", "the numbers of this page"),
     ("stability.json", "the stability analysis"),
