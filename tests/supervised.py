@@ -43,3 +43,19 @@ def with_state(entry, value):
     seen = observation()
     seen.state[entry] = value
     return seen
+
+
+def mermaid(transitions, first, last):
+    """Return transitions as a mermaid state diagram, one arrow per pair of states."""
+    arrows = {}
+    for source, event, target in transitions:
+        arrows.setdefault((source, target), []).append(event.value)
+    lines = ["stateDiagram-v2"]
+    lines += [f'    state "{state.value}" as {state.name}' for state in type(first)]
+    lines.append(f"    [*] --> {first.name}")
+    lines += [
+        f"    {source.name} --> {target.name}: {' / '.join(events)}"
+        for (source, target), events in arrows.items()
+    ]
+    lines.append(f"    {last.name} --> [*]")
+    return "\n".join(lines)

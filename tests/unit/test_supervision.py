@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from supervised import S500, flying, observation, watch, with_state
+from supervised import S500, flying, mermaid, observation, watch, with_state
 
+from uam_control.mission.course import COURSES, NEXT, Course, Cue
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import (
     Event,
@@ -37,24 +38,18 @@ from uam_control.supervision.states import TARGETS, TRANSITIONS
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
 
 
-def mermaid() -> str:
-    """Return the transitions as a mermaid state diagram, one arrow per pair of states."""
-    arrows: dict[tuple[State, State], list[str]] = {}
-    for source, event, target in TRANSITIONS:
-        arrows.setdefault((source, target), []).append(event.value)
-    lines = ["stateDiagram-v2"]
-    lines += [f'    state "{state.value}" as {state.name}' for state in State]
-    lines.append(f"    [*] --> {State.GROUNDED.name}")
-    lines += [
-        f"    {source.name} --> {target.name}: {' / '.join(events)}"
-        for (source, target), events in arrows.items()
-    ]
-    lines.append(f"    {State.DISARMED.name} --> [*]")
-    return "\n".join(lines)
-
-
 def test_the_diagram_in_the_docs_is_the_table():
-    assert f"```mermaid\n{mermaid()}\n```" in DOCS.read_text(), mermaid()
+    drawn = mermaid(TRANSITIONS, State.GROUNDED, State.DISARMED)
+    assert f"```mermaid\n{drawn}\n```" in DOCS.read_text(), drawn
+
+
+def test_the_diagram_of_the_courses_in_the_docs_is_the_table():
+    drawn = mermaid(COURSES, Course.PATH, Course.END)
+    assert f"```mermaid\n{drawn}\n```" in DOCS.read_text(), drawn
+    assert len(NEXT) == len(COURSES)
+    assert {source for source, _, _ in COURSES} == set(Course)
+    assert {target for _, _, target in COURSES} == set(Course)
+    assert {cue for _, cue, _ in COURSES} == set(Cue)
 
 
 def test_the_docs_name_every_state_in_the_policy():

@@ -25,6 +25,7 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.compiled import prepared
 from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.course import NEXT, Course, Cue
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.flatness import write_reference
@@ -34,6 +35,7 @@ from uam_control.mission.motion.trajectory import Trajectory, empty_motion
 from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, GoalPose, Plan, Points
 from uam_control.mission.scenarios.route import SINK
 
+COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
 
 
@@ -45,9 +47,9 @@ class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `retreat` and `descend`.
 
     `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
-    (5, 6 + n): the same without attitude, with jerk and snap. `scenario_time` [s]: time on the
-    scenario, constant during a hold; `end` [s]: stamp at which a descent reaches the ground, inf
-    without one.
+    (5, 6 + n): the same without attitude, with jerk and snap. `course`: what it does, by the table
+    of `course`. `scenario_time` [s]: time on the scenario, constant during a hold; `end` [s]: stamp
+    at which a descent reaches the ground, inf without one.
     """
 
     def __init__(
@@ -77,8 +79,8 @@ class Guidance:
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: WayBack | None = None  # offset from the path, on the way back to it
         self._brake: Braking | Segment | None = None  # in place of the path, after a release
-        self._return_at = math.inf  # stamp [s] at which the brake is over and the return begins
-        self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
+        self.course = Course.PATH
+        self._due = math.inf  # stamp [s] at which a course of limited time ends, see `Cue`
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
         self.shift: Callable[[np.ndarray], None] = _unshifted  # of the path, see `Shift.add`
@@ -95,13 +97,14 @@ class Guidance:
 
     def advance(self, stamp: float) -> None:
         """Set the scenario time for `stamp` [s]; call before `write`. No effect in a descent."""
-        if self._last is not None:
+        if self.course is Course.END:
             return
-        if stamp >= self._return_at:
-            self.go_on(stamp)
-        if stamp >= self._go_on_at:
-            self._arm, self._go_on_at = None, math.inf
-            self._clock.change(stamp, 1.0, self._ramp_length())
+        if stamp >= self._due:
+            if self.course is Course.REST:
+                self.go_on(stamp)
+            if stamp >= self._due and self._take(Cue.ARRIVED):
+                self._arm = None
+                self._clock.change(stamp, 1.0, self._ramp_length())
         time, one, two, three, four = self._clock.at(stamp)
         self.scenario_time, self._rates = time, (one, two, three, four)
 
@@ -146,7 +149,7 @@ class Guidance:
 
         No effect while the path is left, or about to go on after a stop.
         """
-        if rate != self._clock.goal and not self._plans and not self.coming_back:
+        if rate != self._clock.goal and self.course is Course.PATH:
             self._clock.change(stamp, rate, self._ramp_length(PACE_TIME))
 
     @property
@@ -157,8 +160,7 @@ class Guidance:
     @property
     def coming_back(self) -> bool:
         """Return whether the path is left, or about to go on after a stop; not for a plan."""
-        going_on = self._go_on_at != math.inf
-        return going_on or self._away is not None or self._brake is not None
+        return self.course in COMING_BACK or self._away is not None
 
     def replace(self, trajectory: Trajectory) -> None:
         """Follow `trajectory` from now on; it must equal the present one at the scenario time."""
@@ -172,12 +174,12 @@ class Guidance:
     @property
     def planned(self) -> bool:
         """Return whether a plan is flown, or held after its end, in place of the path."""
-        return bool(self._plans) and self._last is None
+        return bool(self._plans) and self.course is not Course.END
 
     def on_way_to(self, goal: GoalPose | Points, stamp: float) -> Plan | None:
         """Return the plan that leads to an equal goal already, None without one."""
-        plan = self._plans.get(goal.columns is BASE) if self._last is None else None
-        return plan if plan is not None and plan.leads_to(goal, stamp) else None
+        plan = self._plans.get(goal.columns is BASE)
+        return plan if self.planned and plan and plan.leads_to(goal, stamp) else None
 
     def arrived(self, stamp: float) -> bool:
         """Return whether every plan is at its end at `stamp` [s]; False without a plan."""
@@ -191,7 +193,7 @@ class Guidance:
         """
         motion = self._last or self._plans.get(True) or self._brake
         begin, end = (stamp, motion.end) if motion else (self.scenario_time, self._end)
-        if motion is None and self._clock.goal == 0.0 and math.isinf(self._go_on_at):
+        if motion is None and self._clock.goal == 0.0 and self.course is not Course.BACK:
             return np.array([stamp]), self.motion[CHI][None].copy()
         times = np.arange(begin, min(max(end, begin), begin + longest) + step, step)
         row, rows = np.zeros_like(self.motion), []
@@ -203,11 +205,12 @@ class Guidance:
 
     def fly(self, stamp: float, plan: Plan) -> None:
         """Leave the path for `plan`, made at `stamp` [s] from the motion; call after `write`."""
-        self._plans[plan.columns is BASE] = plan
-        self._stop_clock(stamp)
-        if plan.columns is BASE:
-            self._away = self._brake = None
-            self._return_at = math.inf
+        base = plan.columns is BASE
+        if self._take(Cue.GOAL if base else Cue.ARM_GOAL):
+            self._plans[base] = plan
+            self._stop_clock(stamp)
+            if base:
+                self._away = self._brake = None
 
     def follow(self, stamp: float, state: np.ndarray) -> None:
         """Set the reference to the vehicle's pose, at rest, while somebody else has control.
@@ -228,7 +231,7 @@ class Guidance:
         controller. age [s]: of the state at `stamp` [s]. A joint that is farther from its reference
         than `start_arm_error` begins at its angle. `go_on` then returns to the path.
         """
-        if not np.all(np.isfinite(state[CHI])):
+        if not np.all(np.isfinite(state[CHI])) or not self._take(Cue.STAY):
             return
         self._plans.pop(True, None)
         self._away = None
@@ -255,11 +258,12 @@ class Guidance:
         length = self._ramp_from(self.motion, acceleration=acceleration)
         for plan in self._plans.values():
             plan.stop(stamp, length)
+        self._take(Cue.STOP)
         self._stop_clock(stamp, acceleration)
         if self._last is not None:
-            self._last = None
-            self._plans.clear()
             self._arm = self._arm_segment(stamp, self._at_rest(stow=False)[0][ARM])
+            self._last = self._brake = None
+            self._plans.clear()
         if stow:
             self.move_arm(stamp)
 
@@ -276,9 +280,12 @@ class Guidance:
         if self._brake is not None:
             rest = max(self._brake.end, self._clock.settled)
             if stamp < rest or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
-                self._return_at = max(rest, stamp)
+                if self._take(Cue.WAIT):
+                    self._due = max(rest, stamp)
                 return
-        self._go_on_at, self._return_at = max(stamp, self._clock.settled), math.inf
+        if not self._take(Cue.RESTED if self.course is Course.REST else Cue.GO_ON):
+            return
+        self._due = max(stamp, self._clock.settled)
         if self._brake is not None or self._plans.pop(True, None) is not None:
             path = self._on_path()
             offset = self.motion - path
@@ -289,12 +296,12 @@ class Guidance:
             offset[:, ARM] = 0.0
             self._return(stamp, offset)
         if self._plans.pop(False, None) is not None or self._arm is not None:
-            time = self._clock.at(self._go_on_at)[0]
+            time = self._clock.at(self._due)[0]
             self._trajectory.write(time, self._path)
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
-            self._go_on_at = max(self._go_on_at, self._arm.end)
+            self._due = max(self._due, self._arm.end)
         if self._away is not None:
-            self._go_on_at = max(self._go_on_at, self._away.end)
+            self._due = max(self._due, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
         """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m].
@@ -317,23 +324,31 @@ class Guidance:
             PEAK * way / p.travel_speed,
             math.sqrt(HARDEST * way / p.stop_acceleration),
         )
+        self._take(Cue.END)
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
     def retreat(self, stamp: float, way: np.ndarray) -> None:
         """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it."""
-        if not np.any(way):
+        if not np.any(way) or not self._take(Cue.RETREAT):
             return
         goal, lengths = self._at_rest(stow=False)
         goal[POSITION] += way
         hardest = HARDEST * float(np.linalg.norm(way)) / self.parameters.brake_acceleration
         lengths[:] = max(float(np.max(lengths)), math.sqrt(hardest))
-        self._brake = Segment(stamp, self.motion, goal, lengths, BASE)
+        self._plans.pop(True, None)
+        self._brake, self._away = Segment(stamp, self.motion, goal, lengths, BASE), None
+
+    def _take(self, cue: Cue) -> bool:
+        """Change the course by the table of `course`; return whether the cue has a transition."""
+        target = NEXT.get((self.course, cue))
+        if target is not None:
+            self.course, self._due = target, math.inf
+        return target is not None
 
     def _stop_clock(self, stamp: float, acceleration: float | None = None) -> None:
         """Slow down to a stop on the path."""
         self._clock.change(stamp, 0.0, self._ramp_length(acceleration=acceleration))
-        self._go_on_at = self._return_at = math.inf
 
     def _on_path(self) -> np.ndarray:
         """Return the path (5, 6 + n) at the scenario time; the next call reuses the array."""

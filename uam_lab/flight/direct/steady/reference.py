@@ -11,6 +11,7 @@ from uam_control.coordinates import CHI, CHI_DOT, Z
 from uam_control.grasp.directive import Step
 from uam_control.grasp.executive import BEFORE
 from uam_control.maths.compiled import borrowing
+from uam_control.mission.course import Course
 from uam_control.mission.flight_sequence import OLDEST
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.motion.flatness import write_reference
@@ -248,11 +249,8 @@ def _on_path(guidance: Guidance, stamp: float) -> bool:
     """Return whether the reference follows the path at the pace of the stamps, at `stamp` [s]."""
     clock = guidance._clock
     return (
-        guidance._last is None
-        and guidance._arm is None
-        and not guidance._plans
+        guidance.course is Course.PATH
         and not guidance.coming_back
-        and math.isinf(guidance._return_at)
         and guidance.goes_on
         and clock.settled <= stamp
     )
