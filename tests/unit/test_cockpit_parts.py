@@ -10,6 +10,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hypothesis import given
 from hypothesis import strategies as st
+from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
@@ -347,6 +348,13 @@ def test_frames_without_end_do_not_fill_the_page():
     view.transforms([frame(0, x=3.0)])
     assert len(scene.frames) == MOST_FRAMES
     assert scene.frames["/world/f0"].position[0] == 3.0
+
+
+def test_a_marker_with_a_number_that_is_not_finite_is_refused():
+    marker = Marker(ns="payload", type=Marker.CUBE)
+    marker.header.frame_id, marker.color.r = WORLD, math.inf
+    with pytest.raises(BadMessage, match="marker payload: a number is not finite"):
+        VehicleView(Scene()).markers(MarkerArray(markers=[marker]))
 
 
 def test_a_value_of_diagnostics_that_is_no_number_is_left_out():

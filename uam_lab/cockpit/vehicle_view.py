@@ -117,8 +117,10 @@ class VehicleView:
 
     def _show(self, path: str, marker: Marker) -> None:
         name, at, scale, paint = marker.ns, marker.pose.position, marker.scale, marker.color
-        colour = tuple(round(255 * part) for part in (paint.r, paint.g, paint.b))
-        position = (at.x, at.y, at.z)
+        tones, position = (paint.r, paint.g, paint.b, paint.a), (at.x, at.y, at.z)
+        if not np.isfinite([*tones, *position, scale.x, scale.y, scale.z]).all():
+            raise BadMessage(f"marker {name}: a number is not finite")
+        colour = tuple(round(255 * part) for part in tones[:3])
         look = {"color": colour, "opacity": paint.a, "position": position}
         if marker.type == Marker.LINE_STRIP:
             points = np.array([[p.x, p.y, p.z] for p in marker.points], dtype=np.float32)
