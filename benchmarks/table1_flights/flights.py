@@ -1,9 +1,9 @@
-"""The rows of the tables: profiles with other readings of an assumption, and the baselines."""
+"""The rows of the tables: profiles with one change at a time, and the baselines."""
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,14 @@ from typing import Any
 import yaml
 
 from uam_control.profiles.profile import Profile, load_profile, profile_of
+from uam_control.vehicle import load_description
 from uam_sim_bridge.plant.effects import presets
 
 AS_FLOWN = "paper_table1_as_flown"
-ASSUMPTIONS = Path(__file__).with_name("assumptions.yaml")
+FLYING = "s500"
+FOLDER = Path(__file__).parent
 POSITION, ARM, BRIDGE = "position_controller", "arm_controller", "mavlink_bridge"
-VEHICLE = "vehicle"
+VEHICLE, AUTOPILOT = "vehicle", "autopilot"
 # of the search: every combination, with the throttle scale of hover
 FORMS = ("theory", "table", "sliding")
 BANDWIDTHS = (12.0, 32.0)  # [rad/s] of the estimator's position
@@ -35,18 +37,28 @@ class Row:
     vehicle: dict[str, Any] = field(default_factory=dict)
 
 
-def changed(changes: dict[str, dict[str, Any]], *names: str) -> Profile:
-    """Return a profile (default: AS_FLOWN) with other parameters: node → name → value."""
-    profile = load_profile(*(names or (AS_FLOWN,)))
-    sections = copy.deepcopy(profile.sections)
+def changed(
+    changes: dict[str, dict[str, Any]],
+    name: str = AS_FLOWN,
+    gains: dict[str, float] | None = None,
+) -> Profile:
+    """Return a profile with other parameters: node → name → value; gains: of the autopilot."""
+    vehicle = load_description()
+    vehicle = replace(vehicle, autopilot_gains=vehicle.autopilot_gains | (gains or {}))
+    sections = copy.deepcopy(load_profile(name).sections)
     for node, values in changes.items():
         sections[node] = sections.get(node, {}) | values
-    return profile_of(sections, Path(f"{profile.name}_changed.yaml"), profile.vehicle)
+    return profile_of(sections, Path(f"{name}_changed.yaml"), vehicle)
 
 
 def as_flown() -> Row:
     """Return the row of the profile itself."""
     return Row("", "as flown, calm", load_profile(AS_FLOWN))
+
+
+def flying() -> Row:
+    """Return the row of the flying profile."""
+    return Row("", "as it flies", load_profile(FLYING))
 
 
 def fitted() -> list[Row]:
@@ -60,14 +72,24 @@ def fitted() -> list[Row]:
     ]
 
 
-def sensitivity() -> list[Row]:
-    """Return a row per reading in `assumptions.yaml`, each with one assumption changed."""
+def one_at_a_time(file: str, profile: str) -> list[Row]:
+    """Return a row per entry of a file beside this module: the profile with that change alone."""
     rows = []
-    for group, readings in yaml.safe_load(ASSUMPTIONS.read_text()).items():
+    for group, readings in yaml.safe_load((FOLDER / file).read_text()).items():
         for label, changes in readings.items():
-            vehicle = changes.pop(VEHICLE, {})
-            rows.append(Row(group, label, changed(changes), vehicle))
+            vehicle, gains = changes.pop(VEHICLE, {}), changes.pop(AUTOPILOT, {})
+            rows.append(Row(group, label, changed(changes, profile, gains), vehicle))
     return rows
+
+
+def sensitivity() -> list[Row]:
+    """Return the rows of `assumptions.yaml`."""
+    return one_at_a_time("assumptions.yaml", AS_FLOWN)
+
+
+def deviations() -> list[Row]:
+    """Return the rows of `deviations.yaml`."""
+    return one_at_a_time("deviations.yaml", FLYING)
 
 
 def search() -> list[Row]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.profiles.profile import default_profile, load_profile, profile_of
 from uam_control.profiles.profile_fit import misfits
 from uam_control.vehicle import load_description
 from uam_lab.flight import flight_settings
@@ -36,6 +36,13 @@ def test_a_profile_of_another_vehicle_is_named(mass, full, expected):
     text = "; ".join(misfits(load_profile("s500", vehicle=vehicle)))
     whole = f"profile s500 does not fit s500_arm: position_controller has {expected}"
     assert text == (whole if expected else "")
+
+
+def test_a_bandwidth_that_the_rate_of_the_poses_caps_is_named():
+    profile = default_profile("modular")
+    sections = profile.sections | {"state_estimator": {"position_bandwidth": 45.0}}
+    (text,) = misfits(profile_of(sections, profile.file))  # 120 poses per second: 0.3 * 120
+    assert text.endswith("position_bandwidth 45 rad/s acts as 36: a pose comes every 8.33 ms")
 
 
 def test_the_flights_notes_have_it():

@@ -107,6 +107,23 @@ def test_the_strengths_leave_the_stated_margins(study):
     assert found["proposed"].delay == pytest.approx(found["PD to the same margin"].delay, rel=1e-3)
 
 
+def test_the_row_as_converged_has_the_margins_of_its_gains(study):
+    """rho of 0.7 of the ceiling's: 1/(1 + 0.7 g) of PD's delay margin is a rough rule."""
+    from uam_lab.study.run import margins
+
+    row = next(one for one in study.rows if one.frozen == "converged")
+    with pytest.raises(ValueError, match="needs the gains"):
+        margins(study, [row])
+    zero = margins(study, [row], {name: np.zeros(5) for name in SUBSYSTEMS})[0]
+    assert zero.share == pytest.approx(1.0, abs=1e-3)
+    made = design.profile(
+        study, next(r for r in study.rows if r.label == "proposed"), study.document["strengths"]
+    )
+    ceilings = {name: np.append(g[:4], 0.0) for name, g in design.largest_gains(made).items()}
+    (full,) = margins(study, [row], ceilings)
+    assert full.share == pytest.approx(0.52, abs=0.02)
+
+
 def test_no_integrator_but_the_laws_own(study):
     row = next(one for one in study.rows if one.label == "proposed")
     made = design.profile(study, row, study.document["strengths"])

@@ -16,6 +16,7 @@ from uam_control.estimation.filters import derivative_step, joint_step, low_pass
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     PoseFilter,
+    allowed_bandwidth,
     parts_of,
     predict_next,
 )
@@ -62,6 +63,17 @@ class EstimatorParameters(ParameterSet):
         5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
     )
     gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+
+    def capped(self, interval: float) -> list[str]:
+        """Return a line per bandwidth that is too large for a pose every `interval` [s]."""
+        allowed = allowed_bandwidth(interval)
+        given = ("position_bandwidth", "attitude_bandwidth")
+        why = f"{allowed:.3g}: a pose comes every {1e3 * interval:.3g} ms"
+        return [
+            f"{name} {value:g} rad/s acts as {why}"
+            for name in given
+            if (value := getattr(self, name)) > allowed
+        ]
 
 
 class StateEstimator:

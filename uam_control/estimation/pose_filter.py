@@ -72,6 +72,12 @@ def parts_of(memory: np.ndarray) -> tuple[EstimatedMotion, np.ndarray, np.ndarra
     return motion, memory[MOTION:poses], memory[poses:].reshape((HISTORY, 7))
 
 
+def allowed_bandwidth(interval: float) -> float:
+    """Return the largest bandwidth [rad/s] with a pose every `interval` [s]; larger ones act as
+    this one."""
+    return LARGEST_GAIN / interval
+
+
 class PoseFilter:
     """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
 
@@ -162,7 +168,7 @@ class PoseFilter:
         if self._last_correction is not None:
             dt = max(stamp - self._last_correction, 1e-3)
             if dt * self._widest > LARGEST_GAIN:
-                bandwidths = np.minimum(bandwidths, LARGEST_GAIN / dt)
+                bandwidths = np.minimum(bandwidths, allowed_bandwidth(dt))
         self._last_correction, self._compared = stamp, compared
         since = last - compared
         if since > LATE:

@@ -1,6 +1,7 @@
 """Node: motion capture + IMU + joints → chi, chi_dot, chi_ddot, once per IMU sample."""
 
 import time
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 NAME = "state_estimator"
+POSES = 100  # of which the interval is measured
 DIVERGED = "the estimate has diverged: no state for 1 s; look at the rates of IMU, poses and joints"
 
 
@@ -72,10 +74,13 @@ class StateEstimatorNode(UamNode):
         self.triggers = (topics.IMU.name,)
         self._diverged_before = 0  # times that the estimate had diverged at the last look
         self._refused_before = 0  # number of refused poses at the last report
+        self._exposed: deque[int] = deque(maxlen=POSES)  # stamps [ns] since the last report
         self._updates, self._biases = Backlog(), Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
-        self._stage.mocap(*read_pose(data))
+        stamp, position, quaternion = read_pose(data)
+        self._exposed.append(stamp)
+        self._stage.mocap(stamp, position, quaternion)
 
     def _on_joints(self, data: bytes) -> None:
         self._stage.joints(*read_joints(data, self._names))
@@ -139,6 +144,8 @@ class StateEstimatorNode(UamNode):
         refused = self._stage.estimator.refused_poses
         # a new estimate counts from zero
         fresh, self._refused_before = max(0, refused - self._refused_before), refused
+        gaps = np.diff(sorted(set(self._exposed)))
+        self._exposed.clear()
         ticks, age = self._stage.ticks, self._stage.pose_age
         values: dict[str, object] = {
             "poses refused": refused,
@@ -153,6 +160,8 @@ class StateEstimatorNode(UamNode):
             return ERROR, DIVERGED, values
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values
+        if gaps.size and (lines := self.parameter_set.current.capped(np.median(gaps) / SECOND)):
+            return WARN, "; ".join(lines), values
         return OK, "running", values
 
     def _warm_up(self) -> None:

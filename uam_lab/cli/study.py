@@ -97,11 +97,11 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
 
     parts = tuple(options.part or PARTS)
     texts, said, drawn, flown = [], [], {}, []
-    if "margins" in parts:
-        rows = [row for row in study.rows if row.law and not row.profiles]
-        texts.append(report.margin_table(margins(study, rows)))
     seeds = options.seeds or study.document["seeds"]
     runner = Runner(study, out, place_of(options), seeds, _flier, options.engine)
+    if "margins" in parts:
+        rows = [row for row in study.rows if row.law and not row.profiles]
+        texts.append(report.margin_table(margins(study, rows, runner.converged())))
     if "varied" in parts:
         results = runner.varied(options.condition or ())
         flown += results

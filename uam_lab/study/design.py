@@ -69,7 +69,9 @@ def profile(
         node = f"{subsystem}_controller"
         part = sections[node] | study.document["law_parameters"]
         part |= _LAWS[row.law](study, subsystem, own[subsystem], row.frozen)
-        if row.frozen == "converged" and gains:
+        if row.frozen == "converged":
+            if gains is None:
+                raise ValueError(f"row '{row.label}' needs the gains that it is frozen at")
             k, zeta = gains[subsystem][:4], gains[subsystem][4]
             part |= {"k_initial": np.maximum(k, NONE).tolist(), "zeta_initial": max(zeta, NONE)}
         sections[node] = part

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,14 +42,19 @@ class Swept:
     result: StudyResult
 
 
-def margins(study: Study, rows: Sequence[Row]) -> list[Margin]:
-    """Return the margins of the rows that have the study's feedback."""
+def margins(
+    study: Study, rows: Sequence[Row], converged: Mapping[str, np.ndarray] | None = None
+) -> list[Margin]:
+    """Return the margins of the rows that have the study's feedback.
+
+    converged: gains of the row that is frozen as converged, see `Runner.converged`.
+    """
     strength, loads = study.document["strengths"], study.document["margin_loads"]
     plain_row = Row("", design.MODULAR, "zero")
     plain = {m: design.loop_margins(design.profile(study, plain_row, {}), m) for m in loads}
     found = []
     for row in rows:
-        made = design.profile(study, row, strength)
+        made = design.profile(study, row, strength, converged)
         at = {m: design.loop_margins(made, m, design.largest_gains(made)) for m in loads}
         found.append(
             Margin(
@@ -91,18 +96,7 @@ class Runner:
 
     def varied(self, labels: Sequence[str] = ()) -> list[StudyResult]:
         """Fly every row in every condition, or in those of these labels only."""
-        study = self.study
-        nominal = [study.condition(NOMINAL)]
-        first = self._fly(
-            flights(
-                study,
-                {PROPOSED: self._made(PROPOSED)},
-                nominal,
-                [1],
-                self._out / "scenarios",
-            )
-        )[0]
-        gains = {name: np.array(values[:5]) for name, values in first.gains.items()}
+        study, gains = self.study, self.converged()
         planned = []
         for row in study.rows:
             made = {row.label: design.profile(study, row, self.strength, gains)}
@@ -112,6 +106,13 @@ class Runner:
             ]
             planned += self._planned(made, chosen)
         return self._fly(planned)
+
+    def converged(self) -> dict[str, np.ndarray]:
+        """Fly `proposed` in the nominal condition; return subsystem → mean of K0..K3, zeta."""
+        nominal = [self.study.condition(NOMINAL)]
+        made, folder = {PROPOSED: self._made(PROPOSED)}, self._out / "scenarios"
+        flown = self._fly(flights(self.study, made, nominal, [1], folder))[0]
+        return {name: np.array(values[:5]) for name, values in flown.gains.items()}
 
     def _made(self, label: str, study: Study | None = None) -> Profile:
         study = study or self.study
