@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test long slow mutants lint clean
+.PHONY: help setup fly test long slow mutants numbers lint clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
@@ -40,6 +40,9 @@ slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there;
 mutants: setup   ## do the unit tests notice small errors? ten minutes; make mutants ARGS="laws/"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutation]"
 	@$(BIN)/python benchmarks/mutants.py $(ARGS)
+
+numbers: setup   ## fly the numbers of the documentation again, list what moved; half an hour
+	@$(BIN)/python benchmarks/numbers_of_docs.py $(ARGS)
 
 lint: setup      ## style, errors that need no run, and who may import whom
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/lint-imports --no-cache --no-logo
