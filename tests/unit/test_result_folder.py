@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import subprocess
+import sys
 from argparse import Namespace
 from datetime import datetime
 
@@ -13,7 +14,7 @@ import yaml
 
 from uam_lab.cli import parser
 from uam_lab.results import atomic, result_folder
-from uam_lab.results.result_folder import ResultFolder, ResultFolderError
+from uam_lab.results.result_folder import ResultFolder, ResultFolderError, make_folder
 
 NOON = datetime(2026, 3, 1, 12, 0, 5)
 
@@ -70,6 +71,7 @@ def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
     folder = ResultFolder.create("hover", "modular", out=here / "a/b")
     assert folder.path == here / "a/b"
     assert not (here / "results").exists()
+    folder.release()  # it has ended and left nothing
     ResultFolder.create("hover", "modular", out=here / "a/b")
     result_folder.write_json(folder.metrics, {"seed": 1})
     with pytest.raises(ResultFolderError, match="already contains a flight"):
@@ -162,3 +164,34 @@ def test_a_full_disk_is_named_with_the_file_and_is_no_wrong_use(here, capsys):
     )
     missing = here / "no such" / "metrics.json"
     assert parser.run(Namespace(command="fly", run=lambda _: atomic.write_text(missing, ""))) == 2
+
+
+CLAIMS = """
+import sys, time
+from pathlib import Path
+from uam_lab.results.result_folder import make_folder
+make_folder(Path(sys.argv[1]), "campaign")
+print("mine", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_folder_is_of_one_process_until_it_dies(tmp_path):
+    """A campaign has it, killed it is free; a flight has it until its release."""
+    with subprocess.Popen(
+        [sys.executable, "-c", CLAIMS, tmp_path], stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout.readline() == "mine\n"
+        for make in (
+            lambda: ResultFolder.create("hover", "modular", tmp_path),
+            lambda: make_folder(tmp_path, "campaign"),
+        ):
+            with pytest.raises(ResultFolderError, match="is in use: .* give another --out"):
+                make()
+        other.kill()
+    flight = ResultFolder.create("hover", "modular", tmp_path)
+    with pytest.raises(ResultFolderError, match="is in use"):
+        ResultFolder.create("hover", "modular", tmp_path)
+    flight.release()
+    make_folder(tmp_path, "campaign")
+    make_folder(tmp_path, "campaign")  # the same process again

@@ -31,7 +31,7 @@ def row(number):
 
 
 def table(folder, of="x"):
-    return RowTable(Path(folder) / "flights.parquet", SCHEMA, of)
+    return RowTable(Path(folder) / "flights.parquet", SCHEMA, {"seed": of, "code": "c"})
 
 
 @settings(max_examples=25, deadline=None)
@@ -82,7 +82,7 @@ def test_many_parts_are_merged_in_between(tmp_path, monkeypatch):
 def test_rows_of_other_inputs_are_refused(tmp_path):
     with table(tmp_path) as rows:
         rows.add(row(1))
-    with pytest.raises(RowTableError, match="give another --out"):
+    with pytest.raises(RowTableError, match="settings: seed was x, is y; undo the change"):
         table(tmp_path, "y")
 
 
@@ -115,7 +115,7 @@ def trial_result(seed):
 def test_a_trial_is_read_back_as_it_was(tmp_path):
     given = trial_result(3)
     file = tmp_path / "flights.parquet"
-    with RowTable(file, trial_rows.schema(2, ["wind"]), "x") as rows:
+    with RowTable(file, trial_rows.schema(2, ["wind"]), {"seed": "x"}) as rows:
         rows.add(trial_rows.to_row(7, given, {"wind": 1.5}))
     (stored,) = rows.compact().to_pylist()
     assert stored["flight"] == 7 and stored["drawn.wind"] == 1.5
@@ -128,7 +128,7 @@ def test_a_trial_is_read_back_as_it_was(tmp_path):
 def test_a_flight_of_a_fault_matrix_is_read_back_as_it_was(tmp_path):
     happened = ({"fault": "motor_loss", "begin_s": 3.5},)
     given = FaultResult("a", "b", "held", "", 4.5, {"arm_deg": [1.0, None]}, happened, None, True)
-    with RowTable(tmp_path / "flights.parquet", fault_rows.SCHEMA, "x") as rows:
+    with RowTable(tmp_path / "flights.parquet", fault_rows.SCHEMA, {"seed": "x"}) as rows:
         rows.add(fault_rows.to_row(0, given))
     (stored,) = rows.compact().to_pylist()
     assert fault_rows.from_row(stored) == given

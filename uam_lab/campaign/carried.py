@@ -36,7 +36,7 @@ class Carried:
 def carried(scenario: str, profile: Profile) -> Carried:
     """Return what flights of this scenario (name or file) with this profile need."""
     model, files = _model(profile.vehicle.model)
-    if Path(scenario).suffix not in (".yaml", ".csv"):
+    if Path(scenario).suffix.lower() not in (".yaml", ".csv"):
         return Carried(None, model, files)
     return Carried(_scenario(scenario, profile.vehicle.source), model, files)
 
@@ -61,10 +61,16 @@ def _model(model: Path) -> tuple[str, dict[str, bytes]]:
     root = configuration.root().resolve()
     if model.is_relative_to(root):
         return model.relative_to(root).as_posix(), {}
-    files = sorted(set(_of_model(model, model.parent, ())))
+    files = files_of_model(model)
     top = Path(os.path.commonpath([file.parent for file in files]))
     content = {file.relative_to(top).as_posix(): file.read_bytes() for file in files}
     return model.relative_to(top).as_posix(), content
+
+
+def files_of_model(model: Path) -> list[Path]:
+    """Return an MJCF file and all files that it names, as absolute paths."""
+    model = model.resolve()
+    return sorted(set(_of_model(model, model.parent, ())))
 
 
 def _of_model(file: Path, folder: Path, further: tuple[str, ...]) -> Iterator[Path]:
@@ -74,10 +80,11 @@ def _of_model(file: Path, folder: Path, further: tuple[str, ...]) -> Iterator[Pa
     named = (one.get(key) for one in elements if one.tag == "compiler" for key in FOLDERS)
     further = (*further, *(name for name in named if name))
     for one in elements:
-        places = [folder / place / one.get("file", "") for place in ("", *further)]
+        names = [value for key, value in one.attrib.items() if key.startswith("file")]
+        places = [folder / place / name for name in names for place in ("", *further)]
         for found in filter(Path.is_file, places):
             found = Path(os.path.abspath(found))
-            if one.tag == "include":
+            if one.tag in ("include", "model"):
                 yield from _of_model(found, folder, further)
             else:
                 yield found

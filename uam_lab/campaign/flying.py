@@ -13,7 +13,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from uam_control.settings import configuration
 from uam_lab.campaign.carried import arrived, carried
 from uam_lab.campaign.trial import Trial, measure
 from uam_lab.flight.direct.warm_up import prepare_direct
@@ -23,14 +22,6 @@ from uam_lab.workers.place import Workplace
 from uam_lab.workers.workers import workers
 
 Progress = Callable[[int, Any], None]
-
-
-def scenario_text(name_or_file: str) -> str:
-    """Return the text of a scenario's file, by which a table of flights knows an edited one.
-
-    Raises ConfigurationError.
-    """
-    return configuration.named("scenarios", name_or_file).read_text(encoding="utf-8")
 
 
 def fly_all(

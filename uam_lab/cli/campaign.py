@@ -79,15 +79,17 @@ def run(options: argparse.Namespace) -> int:
         return _replay(draws[numbers[0]].trial, numbers[0], options.out)
 
     from uam_lab.campaign import campaign_report, trial_rows
-    from uam_lab.campaign.flying import fly_into, scenario_text
+    from uam_lab.campaign.flying import fly_into
+    from uam_lab.campaign.inputs import inputs
     from uam_lab.results.row_table import RowTable
 
     out = make_folder(options.out, "campaign")
-    settings = (options.seed, allowed, profile.sets, profile.bridge())
+    given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}
+    given["profile"] = (profile.sets, profile.bridge())
     flown = RowTable(
         out / TABLE,
         trial_rows.schema(len(vehicle.joints), draws.names),
-        (*settings, vehicle.numbers, scenario_text(options.scenario), effects),
+        inputs(vehicle, options.scenario, given),
     )
     before = sum(number in flown.keys for number in numbers)
     if before:

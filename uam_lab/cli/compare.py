@@ -114,7 +114,8 @@ def run(options: argparse.Namespace) -> int:
         tune=options.tune,
     )
     from uam_lab.campaign import trial_rows
-    from uam_lab.campaign.flying import fly_missing, scenario_text
+    from uam_lab.campaign.flying import fly_missing
+    from uam_lab.campaign.inputs import inputs
     from uam_lab.compare import comparison_report, modularity
     from uam_lab.results.row_table import RowTable
 
@@ -142,7 +143,11 @@ def run(options: argparse.Namespace) -> int:
     flown = RowTable(
         out / "flights.parquet",
         trial_rows.schema(len(vehicle.joints)),
-        (profiles, flights, scenario_text(scenario)),
+        inputs(
+            vehicle,
+            scenario,
+            {"profiles": profiles, "flights": (payloads, seeds, options.engine, effects)},
+        ),
     )
     with Counting("compare", len(every)) as counting:
 

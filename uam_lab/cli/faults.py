@@ -87,7 +87,8 @@ def run(options: argparse.Namespace) -> int:
         say(fault_catalogue.listing())
         return 0
     from uam_lab.campaign import fault_matrix, fault_report, fault_rows
-    from uam_lab.campaign.flying import fly_missing, scenario_text
+    from uam_lab.campaign.flying import fly_missing
+    from uam_lab.campaign.inputs import inputs
     from uam_lab.results.row_table import RowTable
 
     place = place_of(options)
@@ -113,13 +114,15 @@ def run(options: argparse.Namespace) -> int:
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
     prepared = _rehearsals if rehearsed else _flights
-    kind, make, measure, inputs = prepared(options, matrix, vehicle)
+    kind, make, measure, further = prepared(options, matrix, vehicle)
     out = make_folder(options.out, kind)
-    settings = (matrix, options.seed, options.repeat, options.engine, options.clock)
+    settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
     flown = RowTable(
         out / "flights.parquet",
         fault_rows.SCHEMA,
-        (*settings, scenario_text(matrix.scenario), vehicle.numbers, *inputs),
+        inputs(
+            vehicle, matrix.scenario, settings | {"matrix": matrix, "profile and effects": further}
+        ),
     )
     trials = dict(enumerate(make(cell, out) for cell in cells))
     with Counting(kind, len(trials)) as counting:

@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     space = space.with_effects(chosen_effects(options))
     if not 0.0 < options.step <= 0.5:  # before a folder is made
         raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
-    out = make_folder(options.out, "tune", space.name)
+    out = make_folder(options.out, "tune", space.name, shared=options.storage is not None)
     place = place_of(options)
     if place.scheduler and not options.storage:
         say("uam tune: with --scheduler the workers need to reach --storage", error=True)

@@ -57,6 +57,7 @@ REPLACEABLE = (
     "arm_controller",
 )
 COCKPIT = "cockpit"
+DEVICES = ("serial/by-id/*", "ttyACM*", "ttyUSB*")  # of /dev, on which an autopilot may be
 LAYOUTS = {False: "separate nodes", True: "fused: control nodes in one process"}
 LAST_SEED = 2**31 - 1
 NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
@@ -429,6 +430,17 @@ def require_ros() -> None:
         )
     if reason := middleware.refusal():
         raise SettingsError(reason)
+
+
+def require_device(link: LinkUrl | None) -> None:
+    """Raise SettingsError if the serial device of the link is missing."""
+    if link is None or link.kind != "serial" or Path(link.place).exists():
+        return
+    found = sorted(str(one) for name in DEVICES for one in Path("/dev").glob(name))
+    raise SettingsError(
+        f"autopilot: serial device {link.place} does not exist; there are: "
+        f"{', '.join(found) or 'none'}; plug it in, or name another one"
+    )
 
 
 def _left_out(without: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:

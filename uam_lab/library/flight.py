@@ -114,6 +114,8 @@ class Flight:
             raise FlightError("a Flight flies once: make another one")
         if self.settings.engine == "ros":
             flight_settings.require_ros()
+        if self._engine is None:  # a vehicle's own engine waits for its devices
+            flight_settings.require_device(self.settings.link)
         make_ready = prepare if self.settings.engine == "ros" else prepare_direct
         make_ready(self._history.message)
         settings = self.settings
@@ -148,12 +150,15 @@ class Flight:
             outcome = fly(self.settings, folder, self._history, self._stop)
             metrics = conclude(self.settings, folder, outcome)
             self._result = FlightResult(folder.path, metrics, outcome)
+            if outcome.series is None:
+                folder.give_latest_back()
         except BaseException as error:  # raised again in the caller's thread
             self._error = error
             folder.remove_if_empty()
         finally:
             if self._clients is not None:
                 self._clients.close()
+            folder.release()
             self._history.end()
 
     def __enter__(self) -> Flight:

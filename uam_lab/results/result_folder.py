@@ -18,6 +18,12 @@ from typing import Any
 import yaml
 
 from uam_lab.results.atomic import replacing, write_text
+from uam_lab.results.folder_claim import (
+    FolderClaim,
+    ResultFolderError,
+    claim,
+    claim_for_process,
+)
 from uam_lab.results.metrics import plain
 
 RESULTS = Path("results")
@@ -38,10 +44,6 @@ DISTRIBUTIONS = (
 )
 
 
-class ResultFolderError(ValueError):
-    """The result folder cannot be used; the text is one line."""
-
-
 class ResultFolder:
     """The result folder of a flight. All files are written atomically."""
 
@@ -54,6 +56,7 @@ class ResultFolder:
         self.info = path / "info.json"
         self.log = path / "log.mcap"
         self._latest_before: str | None = None  # where results/latest pointed, None for nowhere
+        self._claim: FolderClaim | None = None
 
     @classmethod
     def create(
@@ -73,8 +76,10 @@ class ResultFolder:
             folder = cls(Path(out).expanduser())
             _usable(folder.path)
             folder.refuse_flight()
+            folder._claim = claim(folder.path)
         else:
             folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
+            folder._claim = claim(folder.path)
         if folder._link.parent.absolute() == RESULTS.absolute():
             if folder._link.is_symlink():
                 folder._latest_before = os.readlink(folder._link)
@@ -92,13 +97,23 @@ class ResultFolder:
                 f"result folder {self.path} already contains a flight; give another --out"
             )
 
+    def release(self) -> None:
+        """Let another flight have the folder: nothing more is written to it."""
+        if self._claim is not None:
+            self._claim.release()
+
     def remove_if_empty(self) -> None:
-        """Remove the folder of a refused flight, with which results/latest points back."""
+        """Remove the folder of a refused flight, unless it has files; see `give_latest_back`."""
         for path in (self.path / "logs", self.path):
             with contextlib.suppress(OSError):
                 path.rmdir()
+        if not self.metrics.exists():
+            self.give_latest_back()
+
+    def give_latest_back(self) -> None:
+        """Point results/latest where it pointed before this flight, which flew nothing."""
         link, before = self._link, self._latest_before
-        if self.path.exists() or not link.is_symlink() or os.readlink(link) != self.path.name:
+        if not link.is_symlink() or os.readlink(link) != self.path.name:
             return
         if before is not None and (link.parent / before).exists():
             _point(link, before)
@@ -171,11 +186,18 @@ def git_commit(directory: Path | None = None) -> str | None:
         return None
 
 
-def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> Path:
-    """Make `out`, or results/<time>-<words>; return it. Raises ResultFolderError."""
+def make_folder(
+    out: Path | None, *words: str, now: datetime | None = None, shared: bool = False
+) -> Path:
+    """Make `out`, or results/<time>-<words>; return it. Raises ResultFolderError.
+
+    `out` is this process's to its end, unless it is shared with others that do the same.
+    """
     if out is not None:
         out = Path(out).expanduser()
         _usable(out)
+        if not shared:
+            claim_for_process(out)
         return out
     stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
     return new_folder(RESULTS, "-".join([stamp, *map(in_a_name, words)]))

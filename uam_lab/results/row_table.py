@@ -7,7 +7,7 @@ that is killed loses the rows of the last seconds and nothing else.
 
 from __future__ import annotations
 
-import hashlib
+import json
 import os
 import time
 from collections.abc import Mapping
@@ -36,14 +36,13 @@ class RowTable:
     rows.
     """
 
-    def __init__(self, file: Path, schema: pa.Schema, of: object) -> None:
-        """of: all inputs of the rows; its repr identifies them.
+    def __init__(self, file: Path, schema: pa.Schema, of: Mapping[str, str]) -> None:
+        """of: name → digest of all inputs of the rows.
 
-        Raises RowTableError if the file has rows of other inputs.
+        Raises RowTableError if the file has rows of other inputs, with the names that differ.
         """
         self.file, self._parts = file, file.with_suffix(".parts")
-        mark = hashlib.sha256(f"{schema}\n{of!r}".encode()).hexdigest()
-        self._schema = schema.with_metadata({MARK: mark.encode()})
+        self._schema = schema.with_metadata({MARK: json.dumps(dict(of)).encode()})
         self.key = schema.names[0]
         self._waiting: list[Mapping[str, Any]] = []
         self._written, self._number = time.monotonic(), 0
@@ -114,9 +113,25 @@ class RowTable:
             raise RowTableError(f"{file} cannot be read: {str(error).splitlines()[0]}") from None
         if not table.schema.equals(self._schema, check_metadata=True):
             raise RowTableError(
-                f"{self.file.parent} contains flights with other settings: give another --out"
+                f"{self.file.parent} contains flights with other settings: "
+                f"{self._changed(table.schema)}; undo the change, or give another --out"
             )
         return table
+
+    def _changed(self, found: pa.Schema) -> str:
+        """Return what differs from the inputs of the rows in a file with the schema `found`."""
+        try:
+            before = json.loads((found.metadata or {}).get(MARK, b"{}"))
+        except ValueError:  # of an earlier version
+            before = {}
+        now = json.loads(self._schema.metadata[MARK])
+        differs = [
+            f"{name} was {before[name]}, is {now[name]}"
+            for name in now
+            if name in before and before[name] != now[name]
+        ]
+        differs += [name for name in sorted(before.keys() ^ now.keys()) if before]
+        return ", ".join(differs) or "columns or version of the table"
 
     @staticmethod
     def _write(table: pa.Table, file: Path) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from uam_lab.campaign.flying import fly_missing, scenario_text
+from uam_lab.campaign.flying import fly_missing
+from uam_lab.campaign.inputs import inputs
 from uam_lab.results.row_table import RowTable
 from uam_lab.study.flights import StudyFlight, StudyResult, measure
 from uam_lab.workers.place import Workplace
@@ -35,7 +36,7 @@ def fly(
     progress: Callable[[int, StudyResult], None] = lambda done, result: None,
 ) -> list[StudyResult]:
     """Fly those that the folder `out` has no result of; return all, in the order of `flights`."""
-    table = RowTable(out / FILE, SCHEMA, "study")
+    table = RowTable(out / FILE, SCHEMA, {"rows": "of studies"})
     marks = [mark(flight) for flight in flights]
     trials = dict(zip(marks, flights, strict=True))
     rows = fly_missing(table, trials, place, _to_row, measure, progress)
@@ -43,15 +44,14 @@ def fly(
 
 
 def mark(flight: StudyFlight) -> str:
-    """Return what identifies the inputs of a flight: profile, scenario, vehicle, seed, delays."""
+    """Return what identifies the inputs of a flight: profile, scenario, vehicle, seed, code."""
     trial = flight.trial
-    inputs = (
+    given = (
         *(flight.row, flight.condition, flight.judged, trial.payload_mass, trial.seed),
         *(sorted(trial.vehicle_changes.items()), trial.faults, trial.profile.sections),
-        *(sorted(trial.profile.vehicle.autopilot_gains.items()), trial.engine),
-        *(trial.profile.vehicle.numbers, scenario_text(trial.scenario)),
+        *(trial.engine, inputs(trial.profile.vehicle, trial.scenario, {})),
     )
-    return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]
+    return hashlib.sha256(repr(given).encode()).hexdigest()[:16]
 
 
 def _to_row(key: str, result: StudyResult) -> dict[str, Any]:

@@ -1,0 +1,52 @@
+"""What a resumed campaign must have unchanged: each input is named, and shows a change."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+
+import pytest
+
+from uam_control.settings.configuration import path
+from uam_control.vehicle import load_description
+from uam_lab.campaign.inputs import inputs
+
+
+@pytest.fixture
+def folder(tmp_path):
+    shutil.copytree(path("vehicle/parts"), tmp_path / "parts")
+    for name in ("s500_arm.yaml", "s500_arm.xml"):
+        shutil.copy(path("vehicle") / name, tmp_path)
+    shutil.copy(path("scenarios/hover.yaml"), tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "named"),
+    [
+        ("s500_arm.xml", "<mujoco", "model (MJCF and its files)"),
+        ("parts/world.xml", "<mujoco", "model (MJCF and its files)"),
+        ("s500_arm.yaml", "gust: 0.0", "vehicle"),
+        ("hover.yaml", "description", "scenario"),
+    ],
+)
+def test_each_file_that_is_read_is_an_input(folder, file, text, named):
+    def now():
+        return inputs(load_description(folder / "s500_arm.yaml"), str(folder / "hover.yaml"), {})
+
+    before, content = now(), (folder / file).read_text()
+    assert before == now() and text in content
+    changed = {"gust: 0.0": "gust: 0.5", "<mujoco": "<!-- --><mujoco"}
+    (folder / file).write_text(content.replace(text, changed.get(text, f"#\n{text}"), 1))
+    after = now()
+    assert [name for name in before if before[name] != after[name]] == [named]
+
+
+def test_gains_options_and_code_are_inputs():
+    vehicle = load_description()
+    before = inputs(vehicle, "hover", {"--seed": "1"})
+    gains = vehicle.autopilot_gains | {"MC_ROLLRATE_P": 0.5}
+    other = dataclasses.replace(vehicle, autopilot_gains=gains)
+    after = inputs(other, "hover", {"--seed": "2"})
+    assert [name for name in before if before[name] != after[name]] == ["--seed", "autopilot gains"]
+    assert {"python", "mujoco", "sources and configuration of uam", "laws"} <= before.keys()
