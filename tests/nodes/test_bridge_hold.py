@@ -75,7 +75,7 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
     stopped, thrusts, rolls = rig.count, [], []
     tilted = np.zeros((3, 8))
     tilted[0, 3] = 0.1  # roll [rad], without a reaction of the controllers
-    tilted[0, 2] = 5.0  # as `fly`; low, the autopilot would be left to land
+    tilted[0, 2] = 5.0  # as `fly`
 
     def tick():
         rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, tilted))
@@ -98,6 +98,8 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
     assert rig.autopilot.status.mode is Mode.LAND and rig.autopilot.status.armed
     # after "holding level" the next line of this kind waits for two seconds of wall time
     rig.probe.until(lambda: tick() or "stream stopped" in rig.node.output, "the stream stopped")
+    rig.body.position[2] = 5.0  # it rolled and fell; low, the autopilot would be left to land
+    rig.body.hover()
     for _ in range(400):
         rig.tick((0, 0, WEIGHT))
     assert rig.autopilot.status.mode is Mode.OFFBOARD
