@@ -243,6 +243,7 @@ def test_convergence_by_hand():
     assert convergence.in_words(curve, 2).startswith("converged: the last 2 of 5 evaluations")
     assert convergence.in_words(curve, 4).startswith("not converged: the last 4")
     assert convergence.in_words(curve, 9).startswith("not converged: 5 evaluations")
+    assert convergence.in_words(curve[:2], convergence.LEAST).startswith("not converged: 2 eval")
     assert convergence.in_words(curve[:1], 0).startswith("not converged")
 
 

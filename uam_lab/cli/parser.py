@@ -49,6 +49,18 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(WRONG_USE)
 
 
+class _Version(argparse.Action):
+    """Print the version, and the commit of a checkout, and end."""
+
+    def __call__(self, top: argparse.ArgumentParser, *_: object) -> None:
+        from uam_lab.results.result_folder import versions  # asks git
+
+        found = versions()
+        commit = found["git_commit"]
+        say(f"uam {found['packages']['uam']}" + (f", commit {commit}" if commit else ""))
+        top.exit()
+
+
 def parser(command: str = "") -> argparse.ArgumentParser:
     """Return the parser of `uam`, with the module of this subcommand; with all if there is none."""
     top = OneLineParser(
@@ -56,6 +68,7 @@ def parser(command: str = "") -> argparse.ArgumentParser:
         description="Flight control for aerial manipulators, and flights of it in simulation.",
         epilog="uam <command> --help explains a command.",
     )
+    top.add_argument("--version", action=_Version, nargs=0, help="print version and commit")
     commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
     modules = [COMMANDS[command]] if command in COMMANDS else dict.fromkeys(COMMANDS.values())
     for module in modules:

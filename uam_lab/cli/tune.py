@@ -22,7 +22,7 @@ from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.processes.interrupts import INTERRUPTED
 from uam_lab.results.result_folder import make_folder
 from uam_lab.results.terminal import say
-from uam_lab.tuning.convergence import SMALL
+from uam_lab.tuning.convergence import LEAST, SMALL
 from uam_lab.tuning.convergence import in_words as convergence
 from uam_lab.tuning.space import TuningError, load_space
 
@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> int:
     begun = told(evaluated_start(space, study))
     say(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
     values = curve(study)
-    say(f"search    {convergence(values, options.patience or max(1, len(values) // 2))}")
+    say(f"search    {convergence(values, options.patience or max(LEAST, len(values) // 2))}")
     say(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     say(f"plot      {out / 'search.png'}")
     return status

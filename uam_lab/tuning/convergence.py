@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 SMALL = 0.01  # share of the result
+LEAST = 20  # evaluations without improvement from which on a search may be called converged
 
 
 def improvement(curve: Sequence[float], patience: int) -> float:
