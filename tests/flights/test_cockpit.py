@@ -18,9 +18,10 @@ from uam_msgs_py.node.node_parameters import plain
 # extra `browser`; make slow installs it
 from_playwright = pytest.importorskip("playwright.sync_api")
 expect = from_playwright.expect
-expect.set_options(timeout=60_000)
 
-PATIENCE = 60_000  # [ms] only a failing test waits that long
+
+PATIENCE = 180_000  # [ms] only a failing test waits that long
+expect.set_options(timeout=PATIENCE)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
 # rendered by the processor; nothing is looked for outside of this machine
