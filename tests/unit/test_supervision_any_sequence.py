@@ -57,7 +57,8 @@ class AnySequence(RuleBasedStateMachine):
         if self.seen.authority.released_to:
             assert self.decision.state in self.WITHOUT_CONTROL
         if self.before is State.FAILSAFE and self.decision.state is not State.FAILSAFE:
-            assert command is OperatorCommand.DISARM
+            # by command, on the ground, or held again while nobody else flies
+            assert self.decision.state in (State.DISARMED, State.HOLDING, State.LANDING)
         new = self.supervisor.changes[changes:]
         assert len(new) <= 1
         for change in new:
