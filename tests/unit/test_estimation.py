@@ -59,6 +59,48 @@ def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
     np.testing.assert_allclose(state[2, 6:], [-0.3 * np.sin(t), 0.0], atol=3e-2)
 
 
+def error_of(imu, mocap, rate, offset=0.0, speed=5.0, acceleration=0.0, seconds=4.0):
+    """Return the error of position [m] and velocity [m/s] along a straight line.
+
+    imu, mocap [ticks]: latencies; rate [Hz] and offset [s] of the poses, in no step with the ticks.
+    """
+    estimator, arrivals = StateEstimator(EstimatorParameters(), 0), []
+    force, level = np.array([acceleration, 0.0, 9.81]), np.array([1.0, 0.0, 0.0, 0.0])
+    for k in range(round(seconds / DT)):
+        arrivals.append((k + imu, 1, k * DT))
+    for k in range(round(seconds * rate)):
+        stamp = offset + k / rate
+        arrivals.append((np.ceil(stamp / DT) + mocap, 0, stamp))
+    estimator.joints(0.0, np.zeros(0), np.zeros(0))
+    for arrived, is_imu, t in sorted(arrivals):
+        if arrived > seconds / DT - 1.0:
+            break
+        if is_imu:
+            state = estimator.imu_update(t, np.zeros(3), force)
+            true = speed * t + 0.5 * acceleration * t**2, speed + acceleration * t
+        else:
+            place = np.array([speed * t + 0.5 * acceleration * t**2, 0.0, 0.0])
+            estimator.mocap(t, place, level)
+    return np.abs(state[:2, 0] - true)
+
+
+@pytest.mark.parametrize("rate", [30.0, 120.0, 250.0, 360.0])
+@pytest.mark.parametrize("acceleration", [0.0, 4.0])
+def test_a_pose_counts_at_its_own_time_whichever_sample_arrives_first(rate, acceleration):
+    """5 m/s, any pair of latencies of 0 to 8 ticks, poses between the ticks: 0.1 mm, 1 mm/s."""
+    for imu in range(9):
+        for mocap in range(9):
+            found = error_of(imu, mocap, rate, 0.0013, acceleration=acceleration)
+            assert found[0] < 1e-4 and found[1] < 1e-3, (imu, mocap, *found)
+
+
+def test_every_pose_of_a_fast_motion_capture_corrects():
+    """Of 360 poses in a second each corrects by its share: the error falls as with 120."""
+    slow, fast = (error_of(1, 3, rate, speed=0.0, acceleration=1.0, seconds=0.4)[0]
+                  for rate in (120.0, 360.0))  # fmt: skip
+    assert fast == pytest.approx(slow, rel=0.2)
+
+
 def test_a_frozen_motion_capture_is_ignored():
     """The estimate continues with the IMU; the repeated pose is 1.4 m away at the end."""
     estimator = StateEstimator(EstimatorParameters(), 2)

@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from uam_control.estimation.history import value_at
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     PoseFilter,
     correct,
-    match,
-    nearest,
     predict,
     shift,
 )
@@ -70,13 +69,13 @@ def test_correction_gains():
     # attitude, w = 3: 2w dt = .6 and w^2 dt = .9 times (.72, .96, 0)
     position, velocity, quaternion = np.ones(3), np.zeros(3), LEVEL.copy()
     gyro_bias, accelerometer_bias = np.zeros(3), np.zeros(3)
-    poses = np.array([np.zeros(7), [0.5, 1.0, 1.75, *LEVEL]])
+    predicted = np.array([0.5, 1.0, 1.75, *LEVEL])
     still = np.zeros(3)
     motion = EstimatedMotion(
         position, velocity, quaternion, still, still, gyro_bias, accelerometer_bias
     )
     bandwidths, measured = np.array([2.0, 3.0]), np.array([1.0, 0.0, 2.0])
-    correct(0.1, bandwidths, measured, TURNED, poses, 1, motion)
+    correct(0.1, bandwidths, measured, TURNED, predicted, motion)
     np.testing.assert_allclose(position, [1.3, 0.4, 1.15])
     np.testing.assert_allclose(velocity, [0.6, -1.2, 0.3])
     np.testing.assert_allclose(accelerometer_bias, [-0.4, 0.8, -0.2])
@@ -86,20 +85,23 @@ def test_correction_gains():
     np.testing.assert_allclose(quaternion, [math.cos(0.36), 0.6 * half, 0.8 * half, 0.0])
 
 
-def test_a_pose_is_matched_with_its_prediction():
-    stamps, poses = np.array([1.0, 2.0]), np.zeros((2, 7))
-    poses[1, :3] = 1.0, 2.0, 3.0
-    bias = np.array([2.0, -3.0, 6.0])
-    motion = EstimatedMotion(*(np.zeros(3),) * 6, bias)
-    found = match(stamps, poses, 1.75, np.array([3.0, 5.0, -3.0]), motion)
-    assert found == (1, 0.25, 7.0, 7.0)  # 2 3 6 makes 7, twice
-
-
-def test_the_nearest_stamp_and_of_two_the_first():
-    stamps = np.array([1.0, 2.0, -1.0, 4.0])
-    assert [nearest(stamps, stamp) for stamp in (0.75, 1.75, 9.0, -5.0, 3.0, 1.5)] == [
-        0, 1, 3, 2, 1, 0,
-    ]  # fmt: skip
+@pytest.mark.parametrize(
+    ("stamp", "at", "gap", "value"),
+    [
+        (1.02, 1.02, 0.0, 2.0),
+        (1.005, 1.005, 0.02, 0.5),  # a quarter of the way from 1.00 to 1.02
+        (1.02 + 5e-7, 1.02, 0.0, 2.0),  # half a microsecond: the same moment
+        (1.035, 1.02, 0.0, 2.0),  # beside a gap of 60 ms the nearest
+        (1.065, 1.08, 0.0, 8.0),
+        (0.5, 1.0, 0.0, 0.0),  # before the oldest
+        (2.0, 1.08, 0.0, 8.0),  # after the newest
+    ],
+)
+def test_the_value_at_a_stamp(stamp, at, gap, value):
+    # a ring whose newest row is 1, the oldest 2
+    stamps, rows, found = np.array([1.02, 1.08, 1.0]), np.array([[2.0], [8.0], [0.0]]), np.zeros(1)
+    assert value_at(stamps, rows, 1, stamp, found) == pytest.approx((at, gap))
+    assert found[0] == pytest.approx(value)
 
 
 def test_what_was_predicted_since_a_stamp_is_shifted():
@@ -150,20 +152,37 @@ def test_of_sparse_poses_each_corrects_by_the_same_share():
         np.testing.assert_allclose(found.velocity, [3.0 * 0.09 / interval * 0.1, 0.0, 0.0])
 
 
-def test_a_prediction_is_compared_with_one_pose():
-    found = at_rest([0.0])
+def test_beside_a_gap_a_prediction_is_compared_with_one_pose():
+    found = at_rest([0.0, 0.1])
     for stamp in (0.0, 0.008, 0.016):
         found.correct(stamp, np.array([1.0, stamp, 0.0]), LEVEL)
-    np.testing.assert_allclose(found.position, [0.3, 0.0, 0.0])
+    # 3w dt = .3, and 100 ms since then with 3w^2 dt = .6
+    np.testing.assert_allclose(found.position, [0.36, 0.0, 0.0])
 
 
-def test_a_pose_ahead_of_the_imu_waits_for_its_sample():
-    found = at_rest([0.0])
+def test_poses_ahead_of_the_imu_wait_for_their_samples_in_order_of_their_stamps():
+    found, at_once = at_rest([0.0]), at_rest([0.0, 0.09, 0.11])
     found.correct(0.1, np.array([1.0, 0.0, 0.0]), LEVEL)
-    found.predict(0.09, 0.01, NOTHING, WEIGHT)
+    found.correct(0.085, np.array([0.0, 1.0, 0.0]), LEVEL)
     assert not found.position.any()
-    found.predict(0.1, 0.01, NOTHING, WEIGHT)
-    assert found.position[0] == pytest.approx(0.3)
+    found.predict(0.09, 0.01, NOTHING, WEIGHT)
+    assert found.position[1] == pytest.approx(0.3) and found.position[0] == 0.0
+    found.predict(0.11, 0.01, NOTHING, WEIGHT)
+    assert found.position[0] > 0.0 and not found.ahead
+    for stamp in np.linspace(0.12, 0.15, 100):  # more than are kept
+        found.correct(stamp, np.array([stamp, 0.0, 0.0]), LEVEL)
+    assert len(found.ahead) == 64 and found.ahead[0][0] > 0.12
+
+
+def test_a_pose_between_two_samples_is_compared_with_the_motion_between_them():
+    """At 2 m/s the poses of 0.0125 and 0.015 s agree with the predictions: nothing changes."""
+    found = at_rest([0.0])
+    found.velocity[0] = 2.0
+    for stamp in (0.01, 0.02):
+        found.predict(stamp, 0.01, NOTHING, WEIGHT)
+    for stamp in (0.0125, 0.015):
+        found.correct(stamp, np.array([2.0 * stamp, 0.0, 0.0]), LEVEL)
+    np.testing.assert_allclose([found.position[0], found.velocity[0]], [0.04, 2.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("before", [0.0, 0.03])
@@ -177,16 +196,16 @@ def test_poses_of_a_clock_that_is_ahead_for_long_are_refused_until_it_is_right_a
         place[1] += 1e-6  # no repeat
     assert found.gate.refused > 300 and not found.ahead
     moved = found.position[0]
-    found.predict(2.1, 0.004, NOTHING, WEIGHT)
-    found.correct(2.1, place, LEVEL)
+    found.predict(2.004, 0.004, NOTHING, WEIGHT)
+    found.correct(2.004, place, LEVEL)
     assert found.position[0] != moved
 
 
 @pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])
 def test_a_pose_needs_a_prediction_within_20_ms(stamp, used):
-    found = at_rest([0.0])
+    found = at_rest([0.0, 0.1])
     found.correct(stamp, np.array([1.0, 0.0, 0.0]), LEVEL)
-    assert found.position[0] == pytest.approx(0.3 if used else 0.0)
+    assert found.position[0] == pytest.approx(0.36 if used else 0.0)
 
 
 def test_64_predictions_are_kept():

@@ -234,3 +234,15 @@ def test_late_poses_correct_the_estimate_once(late):
 def test_a_stamp_of_another_clock_gives_no_age():
     assert age_of(1.0, 1.03) == pytest.approx(0.03)
     assert age_of(5.0, 1.0) == age_of(0.0, 1.0) == 0.0
+
+
+@pytest.mark.parametrize("age", [-0.004, 0.0015, 0.0301, 0.18])
+def test_a_pose_of_any_moment_agrees_with_a_steady_motion(age):
+    """At 5 m/s the poses lie between samples or ahead of them; they are exact: no error stays."""
+    filter_, down = Estimator(), np.array([0.0, 0.0, -GRAVITY])
+    for tick in range(1000):
+        time = 0.004 * tick
+        filter_.predict(time, np.zeros(3), down, 0.004)
+        filter_.vision(time, np.array([5.0 * (time - age), 0.0, 0.0]), LEVEL, age)
+    np.testing.assert_allclose(filter_.estimate[4:], [5.0 * time, 0, 0, 5.0, 0, 0], atol=0.02)
+    assert abs(filter_.estimate[4] - 5.0 * time) < 2.5e-3

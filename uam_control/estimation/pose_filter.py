@@ -1,18 +1,21 @@
 """Pose filter: integrates the IMU and corrects with delayed motion capture.
 
 It is a fixed-gain observer, the steady state of a Kalman filter with constant noise. A ring buffer
-stores the predicted poses, so that a measured pose is compared with the prediction at its exposure.
+stores the predicted poses, so that a measured pose is compared with the prediction at its exposure,
+between two samples of the IMU, too. One that arrives before the IMU's sample waits for it.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
+from bisect import insort
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import Z
+from uam_control.estimation.history import OLDEST_MATCH, value_at
 from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.compiled import jit, prepared
@@ -26,14 +29,13 @@ from uam_control.maths.rotations import (
 from uam_control.stamps import MOST_AHEAD
 
 HISTORY = 64  # stored predictions, 256 ms at 250 Hz
-OLDEST_MATCH = 0.02  # s, largest distance in time between a pose and its prediction
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
 AHEAD_FOR = 0.35  # s, in which poses ahead of the IMU wait: longer than its samples may come late
 FIRST = 0.05  # s, interval that the first correction counts for
-# bandwidth × interval between two poses: with sparser poses the bandwidth falls, or the observer
-# would be unstable
+# bandwidth × interval between two poses, or between the two predictions around one: with sparser
+# ones the bandwidth falls, or the observer would be unstable
 LARGEST_GAIN = 0.3
-TURN = 3  # a stored pose: position before, quaternion from this index on
+TURN, POSE = 3, 7  # a stored pose: position before, quaternion from this index on; its numbers
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -50,7 +52,8 @@ class EstimatedMotion(NamedTuple):
 
 
 MOTION = 22  # numbers of an `EstimatedMotion`
-MEMORY = MOTION + 8 * HISTORY  # numbers of a filter's memory, see `parts_of`
+# numbers of a filter's memory, see `parts_of`; the last POSE: the prediction that is compared
+MEMORY = MOTION + (1 + POSE) * HISTORY + POSE
 
 
 @jit
@@ -69,7 +72,7 @@ def parts_of(memory: np.ndarray) -> tuple[EstimatedMotion, np.ndarray, np.ndarra
         memory[19:MOTION],
     )
     poses = MOTION + HISTORY
-    return motion, memory[MOTION:poses], memory[poses:].reshape((HISTORY, 7))
+    return motion, memory[MOTION:poses], memory[poses:-POSE].reshape((HISTORY, POSE))
 
 
 def allowed_bandwidth(interval: float) -> float:
@@ -104,16 +107,16 @@ class PoseFilter:
         self._stamps[:] = -1.0
         self._count = 0
         self._last_correction: float | None = None  # stamp [s]
-        self._compared = math.nan  # stamp [s] of the newest prediction compared with a pose
+        self._compared = math.nan  # stamp [s] of the last prediction compared with a pose
         self._ahead_since = math.inf  # stamp [s] from which on a pose far ahead waits at any time
         self._clock_ahead = False  # whether the clock of the poses is wrong
-        self.ahead: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=HISTORY)
+        self.ahead: list[tuple[float, np.ndarray, np.ndarray]] = []  # in order of the stamps
         self._repeats = Repeats()
         memory, still = self.memory, np.zeros(3)
         self._predict = prepared(predict_next, memory, 0, 0.0, 0.0, 0.0, still, still)
         self._match = prepared(match_stored, memory, 0, 0.0, still)
         self._correct = prepared(
-            correct_stored, memory, 0, 0.0, self._bandwidths, still, np.zeros(4)
+            correct_stored, memory, 0.0, self._bandwidths, still, np.zeros(4)
         )
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
@@ -136,7 +139,7 @@ class PoseFilter:
         row = self.next_row()
         self._predict(self.memory, row, stamp, dt, self.gravity, gyro, specific_force)
         while self.ahead and self.ahead[0][0] <= stamp:
-            self.correct(*self.ahead.popleft())
+            self.correct(*self.ahead.pop(0))
 
     def next_row(self) -> int:
         """Return the row of the stored predictions for the next IMU sample."""
@@ -149,16 +152,20 @@ class PoseFilter:
 
         position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
         older than the stored predictions, repeats the last pose exactly (`Repeats`), or has jumped
-        away from the estimate (`PoseGate`). One that is ahead of the IMU waits for its sample. A
-        prediction is compared with one pose: with a slow IMU the same difference would count
-        several times.
+        away from the estimate (`PoseGate`). One that is newer than the newest prediction waits for
+        the IMU. A stored prediction is compared with one pose: beside a gap of the IMU the same
+        difference would count several times.
         """
         newest = (self._count - 1) % HISTORY
-        found = self._match(self.memory, newest, stamp, position)
-        row, apart, jump, bias, last, compared = found
-        if apart > OLDEST_MATCH:
-            if self._count and stamp > last and self._waits(stamp, last):
-                self.ahead.append((stamp, position.copy(), quaternion.copy()))
+        last = self._stamps[newest]
+        if stamp > last:
+            if self._count and self._waits(stamp, last):
+                if len(self.ahead) == HISTORY:
+                    del self.ahead[0]
+                insort(self.ahead, (stamp, position.copy(), quaternion.copy()), key=itemgetter(0))
+            return
+        compared, gap, jump, bias = self._match(self.memory, newest, stamp, position)
+        if abs(stamp - compared) > OLDEST_MATCH:
             return
         if self._repeats(position, quaternion) or compared == self._compared:
             return
@@ -167,19 +174,20 @@ class PoseFilter:
         bandwidths, dt = self._bandwidths, FIRST
         if self._last_correction is not None:
             dt = max(stamp - self._last_correction, 1e-3)
-            if dt * self._widest > LARGEST_GAIN:
-                bandwidths = np.minimum(bandwidths, allowed_bandwidth(dt))
+            step = max(dt, gap)
+            if step * self._widest > LARGEST_GAIN:
+                bandwidths = np.minimum(bandwidths, allowed_bandwidth(step))
         self._last_correction, self._compared = stamp, compared
         since = last - compared
         if since > LATE:
             before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
-        self._correct(self.memory, row, dt, bandwidths, position, quaternion)
+        self._correct(self.memory, dt, bandwidths, position, quaternion)
         if since > LATE:
             self.position += since * (self.velocity - before[1])
             shift(
                 self._stamps,
                 self._poses,
-                self._stamps[row],
+                compared,
                 self.position - before[0],
                 self.velocity - before[1],
                 quaternion_multiply(before[2] * CONJUGATE, self.quaternion),
@@ -223,57 +231,34 @@ def predict_next(
 @jit
 def match_stored(
     memory: np.ndarray, newest: int, stamp: float, position: np.ndarray
-) -> tuple[int, float, float, float, float, float]:
-    """Return what `match` returns for memory (MEMORY,), and the stamps [s] of the row `newest` and
-    of the row that is returned."""
+) -> tuple[float, float, float, float]:
+    """Find the prediction of `stamp` [s] in memory (MEMORY,) for `correct_stored`.
+
+    newest: row of the newest prediction; position (3,) [m, world]: of the measured pose. Returns
+    what `value_at` returns, the distance of the pose from the prediction [m], and the norm of the
+    accelerometer bias [m/s^2].
+    """
     motion, stamps, poses = parts_of(memory)
-    row, apart, jump, bias = match(stamps, poses, stamp, position, motion)
-    return row, apart, jump, bias, stamps[newest], stamps[row]
+    predicted = memory[-POSE:]
+    compared, gap = value_at(stamps, poses, newest, stamp, predicted)
+    jump = bias = 0.0
+    for i in range(3):
+        jump += (position[i] - predicted[i]) ** 2
+        bias += motion.accelerometer_bias[i] ** 2
+    return compared, gap, math.sqrt(jump), math.sqrt(bias)
 
 
 @jit
 def correct_stored(
     memory: np.ndarray,
-    row: int,
     dt: float,
     bandwidths: np.ndarray,
     position: np.ndarray,
     quaternion: np.ndarray,
 ) -> None:
-    """Correct memory (MEMORY,) with a pose and the prediction in `row`, see `correct`."""
-    motion, _, poses = parts_of(memory)
-    correct(dt, bandwidths, position, quaternion, poses, row, motion)
-
-
-@jit
-def nearest(stamps: np.ndarray, stamp: float) -> int:
-    """Return the index of the value in stamps (m,) [s] that is nearest to `stamp` [s]."""
-    best = 0
-    for row in range(len(stamps)):
-        if abs(stamps[row] - stamp) < abs(stamps[best] - stamp):
-            best = row
-    return best
-
-
-@jit
-def match(
-    stamps: np.ndarray,
-    poses: np.ndarray,
-    stamp: float,
-    position: np.ndarray,
-    motion: EstimatedMotion,
-) -> tuple[int, float, float, float]:
-    """Compare a pose of `stamp` [s] at position (3,) [m, world] with the stored predictions.
-
-    Returns the row of the nearest one, its difference in time [s], its distance from the pose [m],
-    and the norm of the accelerometer bias [m/s^2]. stamps (m,) [s]; poses (m, 7).
-    """
-    row = nearest(stamps, stamp)
-    jump = bias = 0.0
-    for i in range(3):
-        jump += (position[i] - poses[row, i]) ** 2
-        bias += motion.accelerometer_bias[i] ** 2
-    return row, abs(stamps[row] - stamp), math.sqrt(jump), math.sqrt(bias)
+    """Correct memory (MEMORY,) with a pose and the prediction of `match_stored`, see `correct`."""
+    motion, _, _ = parts_of(memory)
+    correct(dt, bandwidths, position, quaternion, memory[-POSE:], motion)
 
 
 @jit
@@ -336,26 +321,24 @@ def correct(
     bandwidths: np.ndarray,
     measured_position: np.ndarray,
     measured_quaternion: np.ndarray,
-    poses: np.ndarray,
-    row: int,
+    predicted: np.ndarray,
     motion: EstimatedMotion,
 ) -> None:
-    """Correct the estimate in place with a measured pose and its prediction poses[row] (7,).
+    """Correct the estimate in place with a measured pose and its prediction (7,).
 
     Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude.
     dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s];
     measured_position (3,) [m, world]; measured_quaternion (4,) body → world [w x y z].
     """
     position, velocity, quaternion, _, _, gyro_bias, accelerometer_bias = motion
-    pose = poses[row]
     w = bandwidths[0]
     for i in range(3):
-        innovation = measured_position[i] - pose[i]
+        innovation = measured_position[i] - predicted[i]
         position[i] += 3.0 * w * dt * innovation
         velocity[i] += 3.0 * w * w * dt * innovation
         accelerometer_bias[i] -= w * w * w * dt * innovation
     w = bandwidths[1]
-    error = rotation_error(measured_quaternion, pose[TURN:])
+    error = rotation_error(measured_quaternion, predicted[TURN:])
     quaternion[:] = quaternion_multiply(
         quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error)
     )

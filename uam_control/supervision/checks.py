@@ -15,6 +15,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, X, Z
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import tilt
+from uam_control.stamps import MOST_AHEAD
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
@@ -283,7 +284,7 @@ def measure(
             if not math.isfinite(state[i, j]):
                 values[0] = 1.0
                 return
-    age = min(max(age, 0.0), LATEST)
+    age = min(max(age, -MOST_AHEAD), LATEST)  # one ahead of the state is compared with its future
     squared, apart, outside, rate = 0.0, 0.0, -math.inf, 0.0
     for i in range(3):
         position = state[CHI, X + i]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.estimation.history import value_at
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
@@ -197,17 +198,16 @@ def moved_on(
     exposed: float, position: np.ndarray, quaternion: np.ndarray, arrays: EstimatorArrays
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a pose of `exposed` [s], moved by the estimated motion since then."""
-    now, past, stamps = arrays.estimate, arrays.past, arrays.stamps
-    then = 0
-    for row in range(len(stamps)):
-        if abs(stamps[row] - exposed) < abs(stamps[then] - exposed):
-            then = row
-    back = past[then, :_PLACE].copy()
+    now, stamps, then = arrays.estimate, arrays.stamps, np.empty(_SPEED)
+    newest = np.argmax(stamps)
+    value_at(stamps, arrays.past, newest, exposed, then)
+    ahead = max(exposed - stamps[newest], 0.0)  # of the newest sample
+    back = then[:_PLACE]
     for i in range(1, 4):
         back[i] = -back[i]
     moved = np.empty(3)
     for i in range(3):
-        moved[i] = position[i] + now[_PLACE + i] - past[then, _PLACE + i]
+        moved[i] = position[i] + now[_PLACE + i] - then[_PLACE + i] - ahead * now[_SPEED + i]
     return moved, quaternion_multiply(now[:_PLACE], quaternion_multiply(back, quaternion))
 
 

@@ -13,13 +13,14 @@ from uam_control.estimation.estimator import (
     follow_joints,
     predict_and_assemble,
 )
+from uam_control.estimation.history import OLDEST_MATCH
 from uam_control.estimation.pose_filter import (
     HISTORY,
     LARGEST_GAIN,
     LATE,
-    OLDEST_MATCH,
     correct_stored,
     match_stored,
+    parts_of,
 )
 from uam_control.estimation.pose_gate import CONTRADICTED, GAP
 from uam_control.estimation.pose_gate import MEMORY as GATE_MEMORY
@@ -197,10 +198,13 @@ def correct_pose(a: Estimation, stamp: float, position: np.ndarray, quaternion: 
     """Do what `PoseFilter.correct` does with a pose of `stamp` [s] that is used; False: nothing."""
     m = a.memory[0]
     newest = (m.count - 1) % HISTORY
-    row, apart, jump, bias, last, compared = match_stored(a.pose, newest, stamp, position)
+    _, stamps, _ = parts_of(a.pose)
+    last = stamps[newest]
+    compared, gap, jump, bias = match_stored(a.pose, newest, stamp, position)
     trusted = stamp - m.gate_suspended > GATE_MEMORY and not bias > CONTRADICTED
     usual = (
-        apart <= OLDEST_MATCH
+        stamp <= last
+        and abs(stamp - compared) <= OLDEST_MATCH
         and compared != m.compared
         and not same(position, quaternion, a.newest)
         and stamp - m.gate_last <= GAP
@@ -208,12 +212,12 @@ def correct_pose(a: Estimation, stamp: float, position: np.ndarray, quaternion: 
         and last - compared <= LATE
     )
     dt = max(stamp - m.last_correction, 1e-3)
-    if not usual or dt * m.widest > LARGEST_GAIN:
+    if not usual or max(dt, gap) * m.widest > LARGEST_GAIN:
         return False
     keep_pose(position, quaternion, a.newest)
     if bias > CONTRADICTED:
         m.gate_suspended = stamp
     m.gate_last = stamp
     m.last_correction, m.compared = stamp, compared
-    correct_stored(a.pose, row, dt, a.bandwidths, position, quaternion)
+    correct_stored(a.pose, dt, a.bandwidths, position, quaternion)
     return True
