@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-MOST_AHEAD = 0.05  # [s] by which a pose may be ahead of the IMU: more is an error of its clock
 SECOND = 1_000_000_000  # [ns]
 _MICROSECOND = 1_000  # [ns]
 NEW_TIME = SECOND  # [ns] a stamp that goes back by more belongs to a new simulation, not to jitter

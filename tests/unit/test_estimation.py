@@ -59,6 +59,15 @@ def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
     np.testing.assert_allclose(state[2, 6:], [-0.3 * np.sin(t), 0.0], atol=3e-2)
 
 
+@pytest.mark.parametrize("latency", [100, 245])
+def test_poses_up_to_a_second_late_keep_the_estimate_near(latency):
+    estimator = StateEstimator(EstimatorParameters(), 2)
+    t, state = feed(estimator, 30.0, gyro_bias=0.01, force_bias=0.1, latency=latency)
+    p, v, *_ = motion(t)
+    np.testing.assert_allclose(state[0, :3], p, atol=0.03)
+    np.testing.assert_allclose(state[1, :3], v, atol=0.04)
+
+
 def error_of(imu, mocap, rate, offset=0.0, speed=5.0, acceleration=0.0, seconds=4.0):
     """Return the error of position [m] and velocity [m/s] along a straight line.
 

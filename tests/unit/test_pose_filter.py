@@ -145,8 +145,9 @@ def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_ms():
 def test_of_sparse_poses_each_corrects_by_the_same_share():
     """Bandwidth times interval is 0.3 at most: the position moves by 3 · 0.3 of the difference."""
     for interval in (0.2, 0.5, 2.0):
-        found = at_rest([0.0, interval])
+        found = at_rest([0.0])
         found.correct(0.0, NOTHING, LEVEL)
+        found.predict(interval, 0.01, NOTHING, WEIGHT)
         found.correct(interval, np.array([0.1, 0.0, 0.0]), LEVEL)
         np.testing.assert_allclose(found.position, [0.09, 0.0, 0.0])
         np.testing.assert_allclose(found.velocity, [3.0 * 0.09 / interval * 0.1, 0.0, 0.0])
@@ -161,7 +162,7 @@ def test_beside_a_gap_a_prediction_is_compared_with_one_pose():
 
 
 def test_poses_ahead_of_the_imu_wait_for_their_samples_in_order_of_their_stamps():
-    found, at_once = at_rest([0.0]), at_rest([0.0, 0.09, 0.11])
+    found = at_rest([0.0])
     found.correct(0.1, np.array([1.0, 0.0, 0.0]), LEVEL)
     found.correct(0.085, np.array([0.0, 1.0, 0.0]), LEVEL)
     assert not found.position.any()
@@ -169,9 +170,9 @@ def test_poses_ahead_of_the_imu_wait_for_their_samples_in_order_of_their_stamps(
     assert found.position[1] == pytest.approx(0.3) and found.position[0] == 0.0
     found.predict(0.11, 0.01, NOTHING, WEIGHT)
     assert found.position[0] > 0.0 and not found.ahead
-    for stamp in np.linspace(0.12, 0.15, 100):  # more than are kept
+    for stamp in np.linspace(0.12, 0.15, 300):  # more than are kept
         found.correct(stamp, np.array([stamp, 0.0, 0.0]), LEVEL)
-    assert len(found.ahead) == 64 and found.ahead[0][0] > 0.12
+    assert len(found.ahead) == 256 and found.ahead[0][0] > 0.12
 
 
 def test_a_pose_between_two_samples_is_compared_with_the_motion_between_them():
@@ -208,11 +209,16 @@ def test_a_pose_needs_a_prediction_within_20_ms(stamp, used):
     assert found.position[0] == pytest.approx(0.36 if used else 0.0)
 
 
-def test_64_predictions_are_kept():
-    for count, used in ((64, True), (65, False)):
-        found = at_rest([0.1 * k for k in range(count)])
-        found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)
-        assert bool(found.position.any()) is used
+def test_a_pose_up_to_a_second_late_is_used_and_the_later_the_slower_it_corrects():
+    stamps = [0.004 * k for k in range(300)]
+    for late, share in ((0.0, 0.3), (0.2, 0.225), (1.0, 0.045), (1.004, 0.0)):
+        found = at_rest(stamps)
+        found.correct(stamps[-1] - late, np.array([1.0, 0.0, 0.0]), LEVEL)
+        # 3 w dt, with w of 2 rad/s or, less, 0.3 / 0.2 s / late; and 3 w^2 dt late since then
+        w = min(2.0, 1.5 / late) if late else 2.0
+        expected = 0.05 * (3.0 * w + 3.0 * w**2 * late) * (share > 0.0)
+        assert found.position[0] == pytest.approx(expected)
+        assert found.gate.refused == (share == 0.0)
 
 
 def test_a_repeated_pose_is_used_once():

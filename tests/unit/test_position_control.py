@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from uam_control.ages import age_by
 from uam_control.vehicle import load_description
-from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator, age_of
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.loops.position_control import (
@@ -231,9 +232,16 @@ def test_late_poses_correct_the_estimate_once(late):
     assert errors[-1] < 0.01
 
 
+def test_a_pose_that_is_too_late_is_none_for_the_autopilot():
+    autopilot = Autopilot()
+    taken = [autopilot.vision(9.0, np.zeros(3), LEVEL, age_by(9.0 - age, 9.0)) for age in
+             (-0.06, -0.04, 0.03, 0.24, 0.26, 9.0)]  # fmt: skip
+    assert taken == [False, True, True, True, False, False]
+
+
 def test_a_stamp_of_another_clock_gives_no_age():
-    assert age_of(1.0, 1.03) == pytest.approx(0.03)
-    assert age_of(5.0, 1.0) == age_of(0.0, 1.0) == 0.0
+    assert age_by(1.0, 1.03) == pytest.approx(0.03)
+    assert age_by(50.0, 1.0) == age_by(0.0, 50.0) == 0.0
 
 
 @pytest.mark.parametrize("age", [-0.004, 0.0015, 0.0301, 0.18])

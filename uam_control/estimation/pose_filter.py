@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import AHEAD, AHEAD_FOR, BRIDGED
 from uam_control.coordinates import Z
 from uam_control.estimation.history import OLDEST_MATCH, value_at
 from uam_control.estimation.pose_gate import PoseGate
@@ -26,15 +27,14 @@ from uam_control.maths.rotations import (
     rotate,
     rotation_error,
 )
-from uam_control.stamps import MOST_AHEAD
 
-HISTORY = 64  # stored predictions, 256 ms at 250 Hz
+HISTORY = 256  # stored predictions: BRIDGED at 250 Hz
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
-AHEAD_FOR = 0.35  # s, in which poses ahead of the IMU wait: longer than its samples may come late
 FIRST = 0.05  # s, interval that the first correction counts for
 # bandwidth × interval between two poses, or between the two predictions around one: with sparser
 # ones the bandwidth falls, or the observer would be unstable
 LARGEST_GAIN = 0.3
+LATE_SHARE = 0.2  # of a pose's lateness counts as such an interval: biases since then are not seen
 TURN, POSE = 3, 7  # a stored pose: position before, quaternion from this index on; its numbers
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -104,7 +104,7 @@ class PoseFilter:
         self.position, self.velocity, self.quaternion, self.rates = self.motion[:4]
         self.acceleration, self.gyro_bias, self.accelerometer_bias = self.motion[4:]
         self.quaternion[0] = 1.0
-        self._stamps[:] = -1.0
+        self._stamps[:] = -math.inf
         self._count = 0
         self._last_correction: float | None = None  # stamp [s]
         self._compared = math.nan  # stamp [s] of the last prediction compared with a pose
@@ -115,9 +115,7 @@ class PoseFilter:
         memory, still = self.memory, np.zeros(3)
         self._predict = prepared(predict_next, memory, 0, 0.0, 0.0, 0.0, still, still)
         self._match = prepared(match_stored, memory, 0, 0.0, still)
-        self._correct = prepared(
-            correct_stored, memory, 0.0, self._bandwidths, still, np.zeros(4)
-        )
+        self._correct = prepared(correct_stored, memory, 0.0, self._bandwidths, still, np.zeros(4))
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
@@ -165,18 +163,20 @@ class PoseFilter:
                 insort(self.ahead, (stamp, position.copy(), quaternion.copy()), key=itemgetter(0))
             return
         compared, gap, jump, bias = self._match(self.memory, newest, stamp, position)
-        if abs(stamp - compared) > OLDEST_MATCH:
+        if last - stamp > BRIDGED or abs(stamp - compared) > OLDEST_MATCH:
+            self.gate.refused += int(last - stamp > BRIDGED)
             return
         if self._repeats(position, quaternion) or compared == self._compared:
             return
         if self.gate(stamp, jump, bias):
             return
         bandwidths, dt = self._bandwidths, FIRST
+        step = max(gap, LATE_SHARE * (last - compared))
         if self._last_correction is not None:
             dt = max(stamp - self._last_correction, 1e-3)
-            step = max(dt, gap)
-            if step * self._widest > LARGEST_GAIN:
-                bandwidths = np.minimum(bandwidths, allowed_bandwidth(step))
+            step = max(dt, step)
+        if step * self._widest > LARGEST_GAIN:
+            bandwidths = np.minimum(bandwidths, allowed_bandwidth(step))
         self._last_correction, self._compared = stamp, compared
         since = last - compared
         if since > LATE:
@@ -198,7 +198,7 @@ class PoseFilter:
 
         Poses that are ahead while samples keep coming have a wrong clock: they would count late.
         """
-        if stamp - newest <= MOST_AHEAD:
+        if stamp - newest <= AHEAD:
             self._clock_ahead, self._ahead_since = False, math.inf
         elif not self._clock_ahead:
             self._ahead_since = min(self._ahead_since, newest) if self.ahead else newest

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 
+from uam_control.ages import UNAIDED
+
 CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
-GAP = 0.5  # s without poses, after which the estimate may have a large error
 MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
 LONGEST = 2.0  # s, longest rejection: later the estimate without poses is worse than the poses
 
@@ -32,7 +33,7 @@ class PoseGate:
         distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
         estimated accelerometer bias.
         """
-        if stamp - self._last > GAP:
+        if stamp - self._last > UNAIDED:
             self.suspend(stamp)
         elif self._rejecting_since is None and bias > CONTRADICTED:
             self._suspended = stamp

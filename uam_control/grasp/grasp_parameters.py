@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from uam_control.ages import FORWARDED
 from uam_control.settings.parameter_set import ParameterSet, choice, integer, number, vector
 
 
@@ -65,7 +66,7 @@ class GraspParameters(ParameterSet):
     )
     contact_climb: float = number(0.15, "climb after such a contact", "m", 0.0, 1.0)
     payload_age: float = number(
-        0.25, "age of the payload's mocap pose above which it is unknown", "s", 0.02, 10.0
+        FORWARDED, "age of the payload's mocap pose above which it is unknown", "s", 0.02, 10.0
     )
     arm_mount: tuple = vector(
         (0.0, 0.0, 0.0), "first joint of the arm in the base frame, FLU", "m", -10.0, 10.0, 3

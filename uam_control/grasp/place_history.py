@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uam_control.stamps import MOST_AHEAD
+from uam_control.ages import AHEAD
 
 ROWS = 512  # 10 s, the largest payload_age, at 50 Hz
 
@@ -33,13 +33,13 @@ class PlaceHistory:
     def at(self, stamp: float) -> np.ndarray:
         """Return the place (3,) [m] at `stamp` [s], NaN if it is older than the oldest one.
 
-        Between two places it is interpolated. It is extrapolated for up to MOST_AHEAD.
+        Between two places it is interpolated. It is extrapolated for up to AHEAD.
         """
         stamps, places, count = self._stamps, self._places, self._count
         newest = (count - 1) % ROWS
         if count and stamp == stamps[newest]:
             return places[newest].copy()
-        if count and stamp <= stamps[newest] + MOST_AHEAD:
+        if count and stamp <= stamps[newest] + AHEAD:
             for i in range(count - 2, max(count - 1 - ROWS, -1), -1):  # the first ones most often
                 before, after = i % ROWS, (i + 1) % ROWS
                 if stamp >= stamps[before]:

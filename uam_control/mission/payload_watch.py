@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from uam_control.ages import AHEAD
 from uam_control.coordinates import ALPHA, CHI, POSITION, Z
 from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight, grasp_windows
 from uam_control.grasp.kinematics import magnet_and_lever
@@ -15,7 +16,6 @@ from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.shift import Shift
-from uam_control.stamps import MOST_AHEAD
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive
@@ -125,7 +125,7 @@ class PayloadWatch:
             lever=arm,
             on_path=not self._guidance.coming_back,
         )
-        if self._known and -MOST_AHEAD <= readings.payload_age <= p.payload_age:
+        if self._known and -AHEAD <= readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
             sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
             self._look_ahead(sight)

@@ -60,12 +60,10 @@ class MissionInputs:
         inlet = self._node.listen(topic, handle, required=False)
 
     def _on_mocap(self, data: bytes) -> None:
-        stamp, *pose = read_pose(data)  # refuses a pose that the estimator cannot use
-        self._inputs.mocap(stamp / SECOND, *pose)
+        self._supervisor.mocap(*read_pose(data))  # refuses a pose that the estimator cannot use
 
     def _on_payload(self, data: bytes) -> None:
-        stamp, position, _ = read_pose(data)
-        self._inputs.payload(stamp / SECOND, position)
+        self._supervisor.payload(*read_pose(data))
 
     def _on_thrust(self, data: bytes) -> None:
         _, _, values = read_values(data, "effort")

@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.stamps import MOST_AHEAD, SECOND
+from uam_control.ages import BRIDGED, usable
+from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
 
 READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
@@ -48,9 +49,10 @@ class SupervisorInputs:
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z].
 
-        A pose from the future is none: its age would never reach a limit.
+        One that is not `usable` is none: from the future, its age would never reach a limit; too
+        late, the estimate does not use it.
         """
-        if (stamp - self._now) / SECOND <= MOST_AHEAD:
+        if usable((self._now - stamp) / SECOND, BRIDGED):
             self.inputs.mocap(stamp / SECOND, position, quaternion)
 
     def payload(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import FORWARDED, usable
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, X, Z
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import tilt
-from uam_control.stamps import MOST_AHEAD
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
@@ -23,7 +23,6 @@ from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop delay"
-LATEST = 0.25  # s, largest age of a pose for which the estimate is extrapolated back to its stamp
 
 
 class Check(NamedTuple):
@@ -284,7 +283,6 @@ def measure(
             if not math.isfinite(state[i, j]):
                 values[0] = 1.0
                 return
-    age = min(max(age, -MOST_AHEAD), LATEST)  # one ahead of the state is compared with its future
     squared, apart, outside, rate = 0.0, 0.0, -math.inf, 0.0
     for i in range(3):
         position = state[CHI, X + i]
@@ -298,7 +296,7 @@ def measure(
     values[4] = state[CHI, Z] - ground
     values[5] = outside
     values[6] = _largest(state[CHI, ALPHA:], joints)
-    values[7] = -math.inf if math.isnan(apart) else math.sqrt(apart)
+    values[7] = math.sqrt(apart) if usable(age, FORWARDED) and not math.isnan(apart) else -math.inf
 
 
 @jit

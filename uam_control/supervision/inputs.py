@@ -8,13 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from uam_control.ages import STALE
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.compiled import jit
 from uam_control.supervision.observation import Readings
 from uam_control.supervision.pace import Pace
 
 POSE = ("position", "attitude")  # controllers without which the vehicle does not follow its path
-BIAS_VALID = 0.1  # [s] age above which a bias says nothing about a contradiction
 BIAS_MEMORY = 5.0  # [s] over which the bias is averaged, to which the newest one is compared
 WATCHED = ("K", "zeta")  # prefixes of the names of gains with a limit
 SUBSYSTEMS = (*POSE, "arm")
@@ -134,7 +134,7 @@ class Inputs:
         while gaps and stamp - gaps[0][0] > 1.0:
             gaps.popleft()
         readings.missed_ticks = float(sum(missed for _, missed in gaps)) if gaps else 0.0
-        if self._bias is not None and stamp - self._bias[1] > BIAS_VALID:
+        if self._bias is not None and stamp - self._bias[1] > STALE:
             readings.contradiction = math.nan
         readings.stamp = stamp
         readings.mocap_age = stamp - self._mocap

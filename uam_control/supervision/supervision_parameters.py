@@ -7,6 +7,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
+from uam_control import ages
 from uam_control.settings.parameter_set import (
     ParameterError,
     ParameterSet,
@@ -53,18 +54,20 @@ class SupervisionLimits(ParameterSet):
     temperature_hold: float = _hold(70.0, "servo temperature", "deg C", 0.0, 150.0)
     temperature_land: float = _land(75.0, "servo temperature", "deg C", 0.0, 150.0)
     battery_land: float = _land(0.15, "state of charge", "1", 0.0, 1.0)
-    mocap_age_hold: float = _hold(0.25, "age of the mocap pose", "s", 0.02, 10.0)
-    mocap_age_failsafe: float = _failsafe(1.0, "age of the mocap pose", "s", 0.02, 60.0)
+    mocap_age_hold: float = _hold(ages.HOLD, "age of the mocap pose", "s", 0.02, 10.0)
+    mocap_age_failsafe: float = _failsafe(ages.FAILSAFE, "age of the mocap pose", "s", 0.02, 60.0)
     mocap_distance_hold: float = _hold(
         0.15, "distance of the mocap pose from the estimate", "m", 0.05, 1000.0
     )
     contradiction_failsafe: float = _failsafe(
         1.0, "fast change of the accelerometer's estimated bias", "m/s^2", 0.1, 1000.0
     )
-    joint_age_hold: float = _hold(0.25, "age of the joint angles", "s", 0.02, 10.0)
-    controller_age_hold: float = _hold(0.25, "age of a controller's newest gains", "s", 0.05, 10.0)
+    joint_age_hold: float = _hold(ages.HOLD, "age of the joint angles", "s", 0.02, 10.0)
+    controller_age_hold: float = _hold(
+        ages.HOLD, "age of a controller's newest gains", "s", 0.05, 10.0
+    )
     autopilot_age_land: float = _land(
-        0.75, "time without a message of autopilot or bridge", "s", 0.3, 60.0
+        ages.LAND, "time without a message of autopilot or bridge", "s", 0.3, 60.0
     )
     # delay of the setpoints against the margin of the profile, see setpoint_delay.py
     delay_margin: float = number(

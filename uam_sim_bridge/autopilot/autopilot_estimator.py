@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import UNAIDED
 from uam_control.estimation.history import value_at
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import (
@@ -30,9 +31,7 @@ _PLACE, _SPEED, _END = 4, 7, 10
 ATTITUDE, POSITION, VELOCITY = slice(_PLACE), slice(_PLACE, _SPEED), slice(_SPEED, _END)
 DOWN = _END - 1  # of `estimate`: velocity downwards
 
-HISTORY = 64  # samples of the estimate that are kept: a quarter of a second
-OLDEST = 0.2  # [s] age up to which the stamp of a pose is used
-VISION_TIMEOUT = 0.5  # s
+HISTORY = 64  # samples of the estimate that are kept: FORWARDED at 250 Hz
 ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
 MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
 
@@ -47,12 +46,6 @@ _LONGEST_PULL = 0.04  # s, longest interval used for the correction by one pose
 _FORCE_TIME = 0.2  # s, time constant of the mean specific force
 _VELOCITY_KEPT = 5.0  # s without vision, after which the next pose resets the velocity to 0
 _REST_TIME = 0.2  # s, time constant of the bias of a vehicle that stands
-
-
-def age_of(stamp: float, time: float) -> float:
-    """Return the age [s] of a pose of `stamp` [s] at `time` [s]; 0 for a stamp of another clock."""
-    age = time - stamp
-    return age if 0.0 <= age <= OLDEST else 0.0
 
 
 class EstimatorArrays(NamedTuple):
@@ -172,10 +165,10 @@ def fuse(
     """
     estimate, past, stamps = arrays.estimate, arrays.past, arrays.stamps
     before = estimate[_PLACE:].copy()
-    if age > 0.0:
+    if age != 0.0:
         position, quaternion = moved_on(exposed, position, quaternion, arrays)
     arrays.vision_down[:] = matrix_from_quaternion(quaternion)[2]
-    if gap > VISION_TIMEOUT:
+    if gap > UNAIDED:
         estimate[:_PLACE] = quaternion
         estimate[_PLACE:_SPEED] = position
         if gap > _VELOCITY_KEPT:
@@ -239,8 +232,8 @@ class Estimator:
         self._rest = prepared(rest, 0.0, self._arrays)
 
     def aided(self, time: float) -> bool:
-        """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
-        return time - self._vision_time < VISION_TIMEOUT
+        """Whether the last vision pose is younger than UNAIDED at `time` [s]."""
+        return time - self._vision_time < UNAIDED
 
     def unaided_for(self, time: float) -> float:
         """Return the time [s] since the last vision pose at `time` [s]."""
@@ -271,7 +264,7 @@ class Estimator:
         """
         gap = time - self._vision_time
         self._vision_time = time
-        self._vision_count = 1 if gap > VISION_TIMEOUT else self._vision_count + 1
+        self._vision_count = 1 if gap > UNAIDED else self._vision_count + 1
         self._fuse(position, quaternion, time - age, age, gap, self._arrays)
 
     def faults(self, time: float) -> list[str]:

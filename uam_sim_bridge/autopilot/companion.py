@@ -7,9 +7,10 @@ import struct
 
 import numpy as np
 
+from uam_control.ages import age_by
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
 from uam_control.settings.parameter_set import ParameterError
-from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, age_of
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
@@ -90,7 +91,7 @@ class Companion:
         euler = np.array([m.roll, m.pitch, m.yaw])
         position = np.array([m.x, m.y, m.z])
         if np.all(np.isfinite(euler)):
-            age = age_of(1e-6 * m.usec, time)
+            age = age_by(1e-6 * m.usec, time)
             self._autopilot.vision(time, position, quaternion_from_euler(euler), age)
 
     def _odometry(self, time: float, m: Message) -> None:
@@ -98,7 +99,7 @@ class Companion:
         if m.frame_id not in _POSE_FRAMES:
             self._say_once(f"odometry refused: frame {m.frame_id}, local NED or FRD expected")
         else:
-            self._autopilot.vision(time, position, quaternion, age_of(1e-6 * m.time_usec, time))
+            self._autopilot.vision(time, position, quaternion, age_by(1e-6 * m.time_usec, time))
 
     def _command_long(self, time: float, m: Message) -> None:
         parameters = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)

@@ -209,10 +209,10 @@ class Autopilot:
     ) -> bool:
         """Handle an external pose; False: refused as not usable.
 
-        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s] at its arrival.
+        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: `age_by` its arrival.
         """
         norm = magnitude_of_usable(position, quaternion)
-        if not norm:
+        if not norm or age == math.inf:
             return False
         self.estimator.vision(time, position, quaternion / norm, age)
         return True

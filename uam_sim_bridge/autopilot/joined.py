@@ -14,13 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import DISCONNECTED, age_by
 from uam_control.maths.compiled import jit, prepared
-from uam_sim_bridge.autopilot.autopilot_estimator import age_of
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
-    HEARTBEAT_TIMEOUT,
     LINK_GAP,
     OffboardSequence,
     Reported,
@@ -92,8 +91,8 @@ class JoinedAutopilot(FlightState):
         return max(LINK_GAP, self.autopilot.parameters["COM_OF_LOSS_T"])
 
     def connected(self, time: float) -> bool:
-        """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
-        return time - self._received_at < HEARTBEAT_TIMEOUT
+        """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""
+        return time - self._received_at < DISCONNECTED
 
     def poll(self, time: float) -> None:
         """Deliver delayed messages; receive the autopilot's messages since the last call.
@@ -172,7 +171,7 @@ class JoinedAutopilot(FlightState):
             deliver()
 
     def _vision(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        self.autopilot.vision(self.time, position, quaternion, age_of(stamp, self.time))
+        self.autopilot.vision(self.time, position, quaternion, age_by(stamp, self.time))
 
     def _command(self, request: Request) -> None:
         self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from uam_control.ages import STALE
 from uam_control.settings.parameter_set import ParameterSet, Text, choice, integer, number, switch
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 from uam_msgs_py.node.tunable import TunableNode
@@ -70,7 +71,7 @@ class BridgeParameters(ParameterSet):
         ("system", "topic"),
     )
     stale_after: float = number(
-        0.1, "time without a command after which commands count as lost", "s", 0.01, 5.0
+        STALE, "time without a command after which commands count as lost", "s", 0.01, 5.0
     )
 
 

@@ -31,7 +31,7 @@ class AutopilotPort(Protocol):
     armed_since: float | None  # [s] tick at which it was first known armed; None while it is not
 
     def connected(self, time: float) -> bool:
-        """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
+        """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""
         ...
 
     @property

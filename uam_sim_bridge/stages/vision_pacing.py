@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.ages import FORWARDED, usable
 from uam_control.estimation.repeats import Repeats
 from uam_control.settings.parameter_set import ParameterSet, number
-from uam_control.stamps import MOST_AHEAD
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 
@@ -52,8 +52,8 @@ class VisionPacing:
         return True
 
     def send(self, autopilot: AutopilotPort, now: float) -> None:
-        """Send the newest pose if it is due at `now` [s], and not of the future."""
-        if self._pose is None or self._pose[0] - now > MOST_AHEAD:
+        """Send the newest pose if it is due at `now` [s], and not too old for it."""
+        if self._pose is None or not usable(now - self._pose[0], FORWARDED):
             return
         p = self._parameters
         exposed, position, quaternion = self._pose

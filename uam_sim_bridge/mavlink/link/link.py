@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from uam_control.ages import DISCONNECTED
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnet
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
-    HEARTBEAT_TIMEOUT,
     LINK_GAP,
     OffboardSequence,
     Reported,
@@ -170,8 +170,8 @@ class OffboardLink(FlightState):
         return self.time_sync.quickest
 
     def connected(self, time: float) -> bool:
-        """Return whether a heartbeat arrived in the last HEARTBEAT_TIMEOUT before `time` [s]."""
-        return time - self._heartbeat_in < HEARTBEAT_TIMEOUT
+        """Return whether a heartbeat arrived in the last DISCONNECTED before `time` [s]."""
+        return time - self._heartbeat_in < DISCONNECTED
 
     @property
     def alive(self) -> bool:

@@ -48,7 +48,6 @@ from uam_sim_bridge.mavlink.protocol.modes import (
     result_word,
 )
 
-HEARTBEAT_TIMEOUT = 3.0  # s without a heartbeat: not connected
 LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T
 LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OFFBOARD because of it
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive

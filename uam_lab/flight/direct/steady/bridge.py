@@ -7,14 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import DISCONNECTED, FORWARDED, UNAIDED, age_by, usable
 from uam_control.maths.compiled import borrowing, jit
-from uam_control.stamps import MOST_AHEAD, SECOND
+from uam_control.stamps import SECOND
 from uam_lab.flight.direct.steady.estimation import keep_pose, same
 from uam_lab.flight.direct.steady.inputs import LIFT, InputArrays
 from uam_lab.flight.direct.steady.memory import load_pose, numbers, put, record, store_pose
 from uam_sim_bridge.autopilot.autopilot_estimator import (
-    OLDEST,
-    VISION_TIMEOUT,
     EstimatorArrays,
     fuse,
 )
@@ -23,7 +22,7 @@ from uam_sim_bridge.autopilot.core import magnitude_of_usable
 from uam_sim_bridge.autopilot.joined import always, at_once
 from uam_sim_bridge.mavlink.offboard.hold import _THRUST_TIME
 from uam_sim_bridge.mavlink.offboard.loop_delay import DelayNumbers
-from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, LINK_GAP, Phase
+from uam_sim_bridge.mavlink.offboard.sequence import LINK_GAP, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import _BATTERY, rate_thrust_of_state
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Situation
 from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
@@ -230,7 +229,7 @@ def send(
     m = a.memory[0]
     now = stamp / SECOND
     received_at = now if m.heartbeat else m.received_at
-    connected = now - received_at < HEARTBEAT_TIMEOUT
+    connected = now - received_at < DISCONNECTED
     if not connected or now - min(m.streamed, m.delivered) > LINK_GAP:
         return False
     thrust = rate_thrust_of_state(tau_p, tau_q, state, a.flat, a.rates)
@@ -273,16 +272,16 @@ def send_vision(a: BridgeArrays, now: float, time: float) -> None:
     """Give the newest pose to the autopilot's estimator if it is due at `now` [s]."""
     m = a.memory[0]
     due = m.exposed - m.vision_sent >= m.vision_interval - 1e-9
-    if not m.pose_waits or m.exposed - now > MOST_AHEAD or not due:
+    if not m.pose_waits or not usable(now - m.exposed, FORWARDED) or not due:
         return
     m.pose_waits, m.vision_sent = 0, m.exposed
     if not autopilots(a.pose, a.given):
         return
-    age = time - m.exposed
-    if not 0.0 <= age <= OLDEST:
-        age = 0.0
+    age = age_by(m.exposed, time)
+    if age == math.inf:
+        return
     gap, m.vision_time = time - m.vision_time, time
-    m.vision_count = 1 if gap > VISION_TIMEOUT else m.vision_count + 1
+    m.vision_count = 1 if gap > UNAIDED else m.vision_count + 1
     fuse(a.given[:3], a.given[3:], time - age, age, gap, a.vision)
 
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import UNAIDED
 from uam_control.maths.compiled import borrowing
 from uam_lab.flight.direct.steady.bridge import BridgeArrays
 from uam_lab.flight.direct.steady.memory import record
 from uam_sim_bridge.autopilot.autopilot_estimator import (
     HISTORY,
-    VISION_TIMEOUT,
     predict,
 )
 from uam_sim_bridge.autopilot.core import LONGEST_STEP, SHORTEST_STEP, RateLoop, control_tick
@@ -95,7 +95,7 @@ def cycle(
     dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - m.time))
     m.time = time
     m.newest = (m.newest + 1) % HISTORY
-    aided = time - link.vision_time < VISION_TIMEOUT
+    aided = time - link.vision_time < UNAIDED
     predict(a.gyro, a.force, time, dt, aided, m.newest, b.vision)
     control_tick(a.gyro, dt, True, False, b.setpoint, a.loop)
     if time >= m.heartbeat_due - 1e-9:

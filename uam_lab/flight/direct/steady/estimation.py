@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import UNAIDED
 from uam_control.estimation.estimator import (
     LONGEST_STEP,
     QUIET_BANDWIDTH,
@@ -18,11 +19,12 @@ from uam_control.estimation.pose_filter import (
     HISTORY,
     LARGEST_GAIN,
     LATE,
+    LATE_SHARE,
     correct_stored,
     match_stored,
     parts_of,
 )
-from uam_control.estimation.pose_gate import CONTRADICTED, GAP
+from uam_control.estimation.pose_gate import CONTRADICTED
 from uam_control.estimation.pose_gate import MEMORY as GATE_MEMORY
 from uam_control.maths.compiled import borrowing
 from uam_control.stages.estimator_stage import BIAS_PERIOD, MEMORY, EstimatorStage, believable
@@ -207,12 +209,13 @@ def correct_pose(a: Estimation, stamp: float, position: np.ndarray, quaternion: 
         and abs(stamp - compared) <= OLDEST_MATCH
         and compared != m.compared
         and not same(position, quaternion, a.newest)
-        and stamp - m.gate_last <= GAP
+        and stamp - m.gate_last <= UNAIDED
         and not (jump > m.gate and trusted)
         and last - compared <= LATE
     )
     dt = max(stamp - m.last_correction, 1e-3)
-    if not usual or max(dt, gap) * m.widest > LARGEST_GAIN:
+    step = max(dt, gap, LATE_SHARE * (last - compared))
+    if not usual or step * m.widest > LARGEST_GAIN:
         return False
     keep_pose(position, quaternion, a.newest)
     if bias > CONTRADICTED:

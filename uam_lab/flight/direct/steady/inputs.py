@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import BRIDGED, STALE, usable
 from uam_control.control.controllers import Controller
 from uam_control.maths.compiled import borrowing
 from uam_control.stages.supervisor_inputs import READ_PERIOD, SupervisorInputs
-from uam_control.stamps import MOST_AHEAD, SECOND
+from uam_control.stamps import SECOND
 from uam_control.supervision.checks import CHECKS, readings_of
 from uam_control.supervision.inputs import (
-    BIAS_VALID,
     SUBSYSTEMS,
     follow_bias,
     largest_of,
@@ -239,7 +239,7 @@ def read_inputs(a: InputArrays, stamp: int) -> None:
         read_messages(a, stamp)
     now = stamp / SECOND
     m.last = now
-    if m.bias_known and now - m.bias_last > BIAS_VALID:
+    if m.bias_known and now - m.bias_last > STALE:
         a.values[_CONTRADICTION] = math.nan
     a.values[_MOCAP_AGE] = now - m.mocap
     a.values[_STILL] = now - m.moved
@@ -255,7 +255,7 @@ def read_inputs(a: InputArrays, stamp: int) -> None:
 def read_messages(a: InputArrays, stamp: int) -> None:
     """Read the kept messages, as `Inputs` does; stamp [ns]: of the reading."""
     m, kept, at = a.memory[0], a.kept, a.at
-    if kept[MOCAP] and (at[MOCAP] - stamp) / SECOND <= MOST_AHEAD:
+    if kept[MOCAP] and usable((stamp - at[MOCAP]) / SECOND, BRIDGED):
         m.mocap = at[MOCAP] / SECOND
         position, quaternion = a.mocap[:3], a.mocap[3:]
         put(position, a.read_position)

@@ -1,0 +1,53 @@
+"""The table of ages: its order, that every consumer has its number, and that the page prints it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from uam_control import ages
+from uam_control.estimation import pose_filter
+from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.supervision.supervision_parameters import SupervisionParameters
+from uam_control.vehicle.loading import LONGEST_PERIOD
+from uam_sim_bridge.autopilot import autopilot_estimator
+from uam_sim_bridge.autopilot.commander import STREAM_GAP
+from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.sequence import LINK_GAP
+
+PERIOD = 0.004  # [s]
+
+
+def test_the_order_of_the_ages_makes_sense():
+    # a pose that the autopilot no longer gets holds the vehicle; while it holds and lands, the
+    # estimate uses poses up to the age at which they are missing for everyone: then failsafe
+    assert ages.AHEAD < ages.STALE < ages.FORWARDED <= ages.HOLD < ages.UNAIDED < ages.BRIDGED
+    assert ages.BRIDGED == ages.FAILSAFE < ages.DISCONNECTED < ages.OTHER_CLOCK
+    assert ages.HOLD < ages.AHEAD_FOR and ages.HOLD < ages.LAND < ages.FAILSAFE
+    # a stream that is lost is seen here before the autopilot leaves OFFBOARD by itself
+    assert ages.STALE < LINK_GAP < STREAM_GAP <= HoldParameters().release_time
+
+
+def test_every_consumer_has_the_number_of_the_table():
+    limits = SupervisionParameters()
+    assert limits.mocap_age_hold == limits.joint_age_hold == limits.controller_age_hold == ages.HOLD
+    assert limits.mocap_age_failsafe == ages.FAILSAFE and limits.autopilot_age_land == ages.LAND
+    assert GraspParameters().payload_age == ages.FORWARDED
+    # the rings reach back as far as poses are used, with one row more at either end
+    assert pose_filter.HISTORY * PERIOD > ages.BRIDGED + 2 * PERIOD
+    assert autopilot_estimator.HISTORY * PERIOD > ages.FORWARDED + PERIOD
+    assert ages.FORWARDED > 2.0 * LONGEST_PERIOD
+
+
+def test_the_page_has_the_table():
+    page = (Path(__file__).parents[2] / "docs/supervision.md").read_text()
+    rows = re.findall(r"^\| `([A-Z_]+)` \| ([\d.]+) \|", page, re.MULTILINE)
+    assert {name: float(value) for name, value in rows} == {
+        name: value for name, value in vars(ages).items() if name.isupper()
+    }
+    assert [float(value) for _, value in rows] == sorted(float(value) for _, value in rows)
+
+
+def test_usable_up_to_an_age_and_a_little_ahead():
+    found = [ages.usable(age, 0.25) for age in (-0.06, -0.05, 0.0, 0.25, 0.26, float("nan"))]
+    assert found == [False, True, True, True, False, False]
