@@ -1,12 +1,14 @@
 """A tour of goals: take off, fly to some places one after the other, come back and land.
 
-python examples/goto_tour.py results/tour
+python examples/goto_tour.py [FOLDER]
 """
 
 import math
 import sys
+from pathlib import Path
 
 from uam_lab import CommandRefused, Flight
+from uam_lab.results.result_folder import new_folder
 
 TOUR = [(0.5, 0.0, 1.0, 0.0), (0.5, 0.5, 1.2, 45.0), (0.0, 0.5, 1.0, 90.0), (0.0, 0.0, 1.0, 45.0)]
 FAST = {"goal_speed": 0.6, "goal_yaw_rate": 1.0}  # [m/s], [rad/s]: the largest on the way
@@ -14,7 +16,7 @@ FAST = {"goal_speed": 0.6, "goal_yaw_rate": 1.0}  # [m/s], [rad/s]: the largest 
 
 def main():
     """Fly the tour; print each goal, and where the vehicle was when it held there."""
-    out = sys.argv[1] if len(sys.argv) > 1 else "results/tour"
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else new_folder(Path("results"), "tour")
     with Flight(scenario="hover", parameters={"mission": FAST}, out=out) as flight:
         flight.wait_for("hover")
         for x, y, z, degrees in TOUR:  # [m, ENU], [deg]

@@ -1,6 +1,6 @@
 """Your own planner: it computes a circle and sends it as a trajectory of the base.
 
-    python examples/own_planner.py results/planner
+    python examples/own_planner.py [FOLDER]
 
 The mission checks the trajectory against its limits before it replaces what is flown. The same
 message may come from any other process, on the topic base_trajectory (docs/planners.md).
@@ -8,12 +8,14 @@ message may come from any other process, on the topic base_trajectory (docs/plan
 
 import math
 import sys
+from pathlib import Path
 
 from geometry_msgs.msg import Transform
 from rclpy.duration import Duration
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from uam_lab import Flight
+from uam_lab.results.result_folder import new_folder
 
 RADIUS, ROUND, STEP = 0.4, 6.0, 0.25  # [m], [s], [s]
 
@@ -37,7 +39,7 @@ def circle(height: float) -> MultiDOFJointTrajectory:
 
 def main():
     """Take off, fly the circle, land."""
-    out = sys.argv[1] if len(sys.argv) > 1 else "results/planner"
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else new_folder(Path("results"), "planner")
     with Flight(scenario="hover", out=out) as flight:
         flight.wait_for("hover")
         print(flight.plan(circle(1.0)))

@@ -1,14 +1,16 @@
 """Your own simulator: a rigid multicopter in numpy, without payload, takes the place of MuJoCo.
 
-python examples/own_simulator.py results/own_simulator direct hover
+python examples/own_simulator.py direct hover [FOLDER]
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 
 from uam_control.maths import rotations as so3
 from uam_lab import Flight
+from uam_lab.results.result_folder import new_folder
 from uam_sim_bridge.plant import Plant, Samples, Truth
 
 INERTIA, UP = np.array([0.0165, 0.0186, 0.0250]), np.array([0.0, 0.0, 9.81])  # [kg m^2], [m/s^2]
@@ -55,6 +57,7 @@ class OwnSimulator(Plant):
 
 
 if __name__ == "__main__":
-    out, engine, scene = sys.argv[1:]
+    engine, scene = sys.argv[1:3]
+    out = Path(sys.argv[3]) if len(sys.argv) > 3 else new_folder(Path("results"), "own_simulator")
     with Flight(plant="own_simulator:OwnSimulator", engine=engine, scenario=scene, out=out) as own:
         print(own.wait().metrics["rms"])

@@ -1,6 +1,6 @@
 """Sweep a gain: RMS position error over lambda_1 of the position controller.
 
-    python examples/sweep_gain.py results/sweep
+    python examples/sweep_gain.py [FOLDER]
 
 The direct engine flies the same law, estimator, autopilot and plant without middleware, in seconds.
 """
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from uam_lab import Flight
+from uam_lab.results.result_folder import new_folder
 
 FACTORS = (0.5, 1.0, 2.0)
 
@@ -30,7 +31,7 @@ def fly(factor: float, out: Path):
 
 def main():
     """Print a row for each flight."""
-    out = Path(sys.argv[1] if len(sys.argv) > 1 else "results/sweep")
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else new_folder(Path("results"), "sweep")
     print("lambda_1   RMS x, y, z [mm]         completed")
     for factor in FACTORS:
         result = fly(factor, out)

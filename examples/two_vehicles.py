@@ -1,6 +1,6 @@
 """Two vehicles at once, each in its own ROS domain; one of them has to wait for the other.
 
-python examples/two_vehicles.py results/pair
+python examples/two_vehicles.py [FOLDER]
 """
 
 import asyncio
@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from uam_lab import Flight
+from uam_lab.results.result_folder import new_folder
 
 
 async def leader(flight: Flight, in_the_air: asyncio.Event):
@@ -28,7 +29,7 @@ async def follower(flight: Flight, in_the_air: asyncio.Event):
 
 async def main():
     """Fly both and print their errors."""
-    out = Path(sys.argv[1] if len(sys.argv) > 1 else "results/pair")
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else new_folder(Path("results"), "pair")
     scenario = sys.argv[2] if len(sys.argv) > 2 else "hover"
     in_the_air = asyncio.Event()
     first = Flight(scenario=scenario, seed=1, out=out / "leader")

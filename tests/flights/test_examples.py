@@ -89,7 +89,7 @@ def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
 
 @pytest.mark.parametrize("engine", [pytest.param("direct", marks=pytest.mark.long), "ros"])
 def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
-    said = run("own_simulator.py", tmp_path, engine, short_scenario)
+    said = run("own_simulator.py", engine, short_scenario, tmp_path)
     found = json.loads((tmp_path / "metrics.json").read_text())
     assert found["mission_completed"] and str(found["rms"]) in said
     assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"

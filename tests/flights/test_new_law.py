@@ -66,6 +66,29 @@ def test_the_parameters_flown_are_the_shared_ones_of_the_default_profile_and_its
         assert "varpi" not in flown[node]
 
 
+def test_a_file_with_one_parameter_changes_that_one(tmp_path):
+    """The law has no profile whose name could stand before the file."""
+    from uam_control.settings.parameter_file import read_sections
+
+    part = tmp_path / "part.yaml"
+    part.write_text("arm_controller: {ros__parameters: {kappa: [0.25, 0.25]}}")
+    (tmp_path / "short.yaml").write_text(SHORT)
+    flown = uam(
+        *("fly", "--controller", "pid", "--profile", str(part), "--engine", "direct"),
+        *(
+            "--scenario",
+            str(tmp_path / "short.yaml"),
+            "--no-report",
+            "--out",
+            str(tmp_path / "out"),
+        ),
+    )
+    assert flown.returncode == 0, flown.stdout + flown.stderr
+    sections = read_sections(tmp_path / "out" / "parameters.yaml")
+    assert sections["arm_controller"]["kappa"] == [0.25, 0.25]
+    assert sections["position_controller"]["kappa"] == [0.5] * 3
+
+
 def test_the_report_calls_it_by_its_label(folder):
     assert "PID" in (folder / "report.html").read_text()
 

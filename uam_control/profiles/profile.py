@@ -135,15 +135,18 @@ def parameter_set(
 
 
 def load_profile(
-    *names_or_files: str, vehicle: VehicleDescription | None = None, namespace: str = "/"
+    *names_or_files: str,
+    vehicle: VehicleDescription | None = None,
+    namespace: str = "/",
+    onto: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Profile:
     """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError.
 
     With several profiles, a later one replaces single parameters of the earlier ones. Parameters
     that no profile has come from the vehicle (None: the default one), where they follow from it.
-    namespace: of the vehicle's nodes, see `read_sections`.
+    namespace: of the vehicle's nodes, see `read_sections`. onto: sections that come first.
     """
-    sections: dict[str, dict[str, Any]] = {}
+    sections = {node: dict(values) for node, values in (onto or {}).items()}
     files = [_file(given) for given in names_or_files]
     for file in files:
         found = read_sections(file, namespace)
@@ -183,6 +186,11 @@ def _shared(
     return rows
 
 
+def own_profile(law: str, vehicle: VehicleDescription) -> str | None:
+    """Return the name of the profile that the vehicle, or the catalogue, has for `law`."""
+    return vehicle.profile(law) or catalogue.law(law).profile
+
+
 def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Profile:
     """Return the profile of `law` for flights without a named profile; raises ProfileError.
 
@@ -192,8 +200,7 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
     have (same name, meaning, unit and range), and defaults for the others.
     """
     vehicle = vehicle or load_description()
-    own = vehicle.profile(law) or catalogue.law(law).profile
-    if own:
+    if own := own_profile(law, vehicle):
         return load_profile(own, vehicle=vehicle)
     sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)
     for node in CONTROLLERS:

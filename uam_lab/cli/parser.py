@@ -68,7 +68,8 @@ def parser(command: str = "") -> argparse.ArgumentParser:
         description="Flight control for aerial manipulators, and flights of it in simulation.",
         epilog="uam <command> --help explains a command.",
     )
-    top.add_argument("--version", action=_Version, nargs=0, help="print version and commit")
+    text = "print version and commit"
+    top.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help=text)
     commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
     modules = [COMMANDS[command]] if command in COMMANDS else dict.fromkeys(COMMANDS.values())
     for module in modules:

@@ -11,7 +11,12 @@ from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
-from uam_control.profiles.profile import Profile, default_profile, load_profile
+from uam_control.profiles.profile import (
+    Profile,
+    default_profile,
+    load_profile,
+    own_profile,
+)
 from uam_control.profiles.profile_fit import misfits
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
@@ -295,6 +300,10 @@ def settings(
             *(str(configuration.named("profiles", str(one))) for one in given),
             vehicle=described,
             namespace=namespace,
+            # a file may then have a part of the parameters: there is no name for the others
+            onto=None
+            if own_profile(controller, described)
+            else default_profile(controller, described).sections,
         )
         if given
         else default_profile(controller, described)
