@@ -34,6 +34,9 @@ from uam_sim_bridge.mavlink.protocol.attitude_target import STILL
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
 # [rad/s] largest body rates that are kept for a released vehicle; a pilot yaws faster than it rolls
 MOST_RATES = np.array([2.0, 2.0, 3.5])
+# [m/s] unknown; braked by a thrust a bit below that of hover, as in the autopilot's own descent: a
+# vehicle that stands already must not lift off
+CLIMBING = np.array([math.nan, math.nan, 0.3])
 LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
 
 NO_STREAM = "no stream, OFFBOARD is not possible"
@@ -165,7 +168,7 @@ class SetpointSource:
             return self._idle
         velocity, longest, p = UNKNOWN, None, self._hold.parameters
         if let_go:
-            longest = p.level_time
+            velocity, longest = CLIMBING, p.level_time
         elif not self._fresh(self._estimated, now):
             longest = p.release_time
         else:
