@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 from supervised import S500, flying, observation, watch
 
@@ -56,6 +57,15 @@ def test_poses_that_agree_for_clear_after_are_held_on_and_the_path_goes_on(late)
     assert supervisor.state is State.FLYING and path[-1] == (State.HOLDING, State.FLYING)
     assert path[0][0] is (State.FAILSAFE if late else State.BLIND)
     assert supervisor.changes[-2].cause == "mocap agrees again"
+
+
+def test_poses_that_stay_away_are_no_agreement_when_the_estimator_follows_them():
+    off = observation(readings=Readings(mocap_age=0.01, mocap_position=np.array([0.3, 0.0, 1.0])))
+    supervisor = flying()
+    watch(supervisor, off, 1.1)
+    assert supervisor.state is State.BLIND
+    watch(supervisor, off, S500.blind_time, BEGIN + 1.1)
+    assert watch(supervisor, good(), 5.0, 4.0).state is State.FAILSAFE
 
 
 @pytest.mark.parametrize(

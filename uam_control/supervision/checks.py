@@ -23,6 +23,7 @@ from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop delay"
+POSES_OFF = "motion capture"
 
 
 class Check(NamedTuple):
@@ -70,7 +71,7 @@ CHECKS = (
     Check("geofence", "{name} left by {value:.2f} m, {limit:g} m allowed",
           land="geofence_land", failsafe="geofence_failsafe"),
     Check("joint angle", "{name} at {value:.2f} of its limit", 1.0),
-    Check("motion capture", "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
+    Check(POSES_OFF, "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
           "mocap_distance_hold", failsafe="mocap_distance_hold", in_flight=True,
           failsafe_after="mocap_age_failsafe", blind=True),
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1,

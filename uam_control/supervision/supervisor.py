@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
 from uam_control.settings.plain_members import plain_members
-from uam_control.supervision.checks import SETPOINT_DELAY, Checks
+from uam_control.supervision.checks import POSES_OFF, SETPOINT_DELAY, Checks
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
@@ -303,7 +303,10 @@ class Supervisor:
         finding = self._checks.finding
         if self.state is State.BLIND:  # it goes on with its landing, or its hold, afterwards
             self._interrupted, self._failed = source, finding.name
-        elif self.state is not State.FAILSAFE:
+        elif self.state is State.FAILSAFE:
+            if self._failed == POSES_OFF:  # the estimator soon follows poses that stay away
+                self._failed = ""
+        else:
             self._planned = event is Event.LANDING_DUE
             quantity = finding.name if event is Event.HOLD_LIMIT and finding else self._failed
             held = self._failed and self._interrupted is State.HOLDING
