@@ -28,7 +28,7 @@ from uam_sim_bridge.plant import Vehicle
 PROFILE = load_profile("s500")
 OPEN = replace(
     PROFILE.sets["mission"], reference_thrust=36.0, reference_tilt=1.2, tilt_hold=1.25,
-    tilt_failsafe=1.4,
+    tilt_failsafe=1.4, reference_yaw_rate=5.0,
 )  # fmt: skip
 TIMES = np.arange(0.0, 3.0, 0.01)
 
@@ -362,7 +362,7 @@ def test_the_pre_arm_report_has_the_reference():
     mission.configure(
         replace(parameters, reference_thrust=45.0, reference_tilt=1.0, tilt_hold=1.04)
     )
-    assert "thrust" not in mission.not_ready and "reference: tilt 1.04" in mission.not_ready
+    assert "thrust" not in mission.not_ready and "tilt 1.04 rad exceeds 1 rad" in mission.not_ready
 
 
 @pytest.mark.parametrize(

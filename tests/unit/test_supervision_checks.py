@@ -30,8 +30,8 @@ def measured(state, reference=None, mocap=(math.nan,) * 3, age=math.nan, ground=
     reference = np.zeros(state.shape) if reference is None else reference
     limits = np.ones(state.shape[1] - 6) if joints is None else np.array(joints)
     measure(state, reference, np.array(mocap), age, ground, BOX, limits, values)
-    np.testing.assert_array_equal(values[8:], 77.0)
-    return values[:8]
+    np.testing.assert_array_equal(values[9:], 77.0)
+    return values[:9]
 
 
 def test_quantities_of_a_state():
@@ -40,8 +40,9 @@ def test_quantities_of_a_state():
     state[1, 3:6] = 0.5, -4.0, 3.0
     reference[0, :6] = 0.0, 1.0, 2.0, 9.0, 9.0, 9.0
     values = measured(state, reference, ground=0.5, joints=[2.0, 2.5])
-    # error (2, -2, 1); tilt: cos A cos B = .48; 1 m below the top, 3 m to the nearest wall
-    expected = [0.0, 3.0, math.acos(0.48), 4.0, 2.5, -1.0, 0.5, -math.inf]
+    # error (2, -2, 1); tilt: cos A cos B = .48; 1 m below the top, 3 m to the nearest wall; yaw
+    # 8.3 rad behind: a turn less
+    expected = [0.0, 3.0, math.acos(0.48), 4.0, 2.5, -1.0, 0.5, -math.inf, 8.3 - 2.0 * math.pi]
     np.testing.assert_allclose(values, expected)
     state[0, 3:5] = math.pi - A, 0.0  # upside down
     assert measured(state)[2] == pytest.approx(math.pi - A)
@@ -70,8 +71,7 @@ def test_the_largest_body_rate(rates, largest):
 
 @pytest.mark.parametrize(("age", "pose"), [
     (0.1, (0.0, 0.0, 4.0)),  # where it was 0.1 s ago: (1, 2, 3) - .1 (10, 20, -10)
-    (-0.1, (1.0, 2.0, 3.0)),  # a pose of the future is compared with now
-    (0.4, (-1.5, -3.0, 5.5)),  # no further back than 0.25 s
+    (-0.04, (1.4, 2.8, 2.6)),  # where it will be
 ])  # fmt: skip
 def test_distance_of_motion_capture_from_the_estimate_of_its_time(age, pose):
     state = np.zeros((3, 8))
@@ -79,6 +79,10 @@ def test_distance_of_motion_capture_from_the_estimate_of_its_time(age, pose):
     assert measured(state, mocap=pose, age=age)[7] == pytest.approx(0.0, abs=1e-12)
     off = np.array(pose) + [2.0, -1.0, 2.0]
     assert measured(state, mocap=off, age=age)[7] == pytest.approx(3.0)
+
+
+def test_a_pose_older_than_a_quarter_of_a_second_is_no_distance():
+    assert measured(np.zeros((3, 8)), mocap=(9.0, 0.0, 0.0), age=0.26)[7] == -math.inf
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -101,10 +105,10 @@ def test_readings_have_their_places():
     )  # fmt: skip
     limits = np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25])
     read(readings_of(readings), readings.joint_effort, readings.gains, *limits, values)
-    np.testing.assert_array_equal(values[:8], 77.0)
+    np.testing.assert_array_equal(values[:9], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
-        values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 20]
+        values[9:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 20]
     )
 
 
@@ -116,13 +120,14 @@ def test_what_is_unknown_is_below_every_limit():
         *(readings_of(nothing), nothing.joint_effort, nothing.gains),
         *(np.ones(2), np.ones(3), values),
     )
-    np.testing.assert_array_equal(values[8:], -math.inf)
+    np.testing.assert_array_equal(values[9:], -math.inf)
 
 
 # not the defaults: a test that judges by them would not notice another limit in their place
 AT_ONCE = SupervisionParameters(
     position_error_hold=0.5, position_error_land=2.0, position_error_failsafe=4.0,
     tilt_hold=0.5, tilt_failsafe=1.0, body_rate_hold=2.0, body_rate_failsafe=6.0,
+    heading_error_hold=0.625,
     altitude_hold=3.0, geofence_low=(-8.0, -8.0, -8.0), geofence_high=(8.0, 8.0, 8.0),
     geofence_land=0.5, geofence_failsafe=3.0, joint_angle_hold=(1.0, 2.0),
     joint_effort_hold=(2.0, 4.0), temperature_hold=50.0, temperature_land=60.0,
@@ -160,6 +165,7 @@ LIMITS = [
     ("tilt", FAILSAFE, lambda x: seen([((0, 4), -x)]), 1.0),
     ("body rate", HOLD, lambda x: seen([((1, 3), x)]), 2.0),
     ("body rate", FAILSAFE, lambda x: seen([((1, 5), -x)]), 6.0),
+    ("heading error", HOLD, lambda x: seen([((0, 5), -x)]), 0.625),
     ("joint angle", HOLD, lambda x: seen([((0, 7), -2.0 * x)]), 1.0),
     ("motion capture", HOLD,
      lambda x: seen(mocap_position=np.array([x, 0.0, 1.0]), mocap_age=0.0), 0.25),
@@ -338,4 +344,4 @@ def test_other_limits_are_those_of_the_next_tick():
 
 
 def test_every_quantity_is_named_once():
-    assert len({check.name for check in CHECKS}) == len(CHECKS) == 22
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 23

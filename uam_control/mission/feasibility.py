@@ -79,8 +79,9 @@ class Demand(NamedTuple):
     """What a reference needs at times (m,) [s] of mission time.
 
     position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; angles (m, n) [rad]; joint_rates (m, n) [rad/s]; joint_torques (m, n) [N m] and
-    magnet_force (m,) [N], the payload's apparent weight, NaN if the arm's masses are unknown.
+    [rad/s, FLU]; yaw_rate (m,) [rad/s]; angles (m, n) [rad]; joint_rates (m, n) [rad/s];
+    joint_torques (m, n) [N m] and magnet_force (m,) [N], the payload's apparent weight, NaN if the
+    arm's masses are unknown.
     """
 
     times: np.ndarray
@@ -89,6 +90,7 @@ class Demand(NamedTuple):
     thrust: np.ndarray
     tilt: np.ndarray
     body_rates: np.ndarray
+    yaw_rate: np.ndarray
     angles: np.ndarray
     joint_rates: np.ndarray
     joint_torques: np.ndarray
@@ -189,6 +191,7 @@ class Feasibility:
             (THRUST, demand.thrust, self.thrust_limit, "N"),
             ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
             ("body rate", rates, p.body_rate_hold, "rad/s"),
+            ("yaw rate", np.abs(demand.yaw_rate), p.reference_yaw_rate, "rad/s"),
         ]
         for i in range(demand.angles.shape[1]):
             angle, rate, torque = (
@@ -313,6 +316,7 @@ class Feasibility:
             thrust,
             np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
             rates,
+            turning[:, 2],
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
             *self._arm_loads(times, rows[CHI], rotation, carried),

@@ -67,10 +67,14 @@ class BrakeLimits(ParameterSet):
 @dataclass(frozen=True)
 class FeasibilityLimits(ParameterSet):
     """Limits of the reference before take-off, in addition to the supervisor's. Without a value
-    in the profile they are the position controller's thrust_max and tilt_max."""
+    in the profile they are the position controller's thrust_max and tilt_max, and 90 % of the
+    bridge's rate_limit about z: the law needs the rest."""
 
     reference_thrust: float = number(36.0, "largest force that a reference needs", "N", 0.1, 1e3)
     reference_tilt: float = number(0.35, "largest tilt that a reference needs", "rad", 0.01, 1.5)
+    reference_yaw_rate: float = number(
+        2.7, "largest yaw rate that a reference needs", "rad/s", 0.01, 50.0
+    )
 
 
 @dataclass(frozen=True)

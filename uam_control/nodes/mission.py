@@ -28,7 +28,7 @@ from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
-from uam_control.profiles.profile import Profile, default_profile, reference_limits
+from uam_control.profiles.profile import BRIDGE, Profile, default_profile, reference_limits
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
@@ -138,11 +138,12 @@ class MissionNode(UamNode):
         )
 
     def _reference_limits(self, profile: Profile) -> dict[str, float]:
-        """Return those of the position controller: of the parameter file, or of `profile`."""
+        """Return those by position controller and bridge: of the parameter file, or `profile`."""
         default = profile.sets[POSITION_CONTROLLER]
         given = neighbour_section(self, POSITION_CONTROLLER)
         limits = {name: given[name] for name in PositionLimits.specs() if name in given}
-        return reference_limits(replace(default, **limits))
+        bridge = neighbour_section(self, BRIDGE) or profile.section(BRIDGE)
+        return reference_limits(replace(default, **limits), bridge)
 
     def _scenario(self, vehicle: VehicleDescription) -> Scenario:
         """Return the scenario; with the parameter `retime` slowed down until it is feasible."""

@@ -42,6 +42,7 @@ CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
+FOLLOWED = 0.9  # share of the bridge's largest yaw rate that a reference may need
 # of the process of every node
 PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
@@ -221,9 +222,18 @@ def _file(name_or_file: str) -> Path:
         raise ProfileError(str(error)) from None
 
 
-def reference_limits(position: PositionLimits) -> dict[str, float]:
-    """Return the limits of the mission's reference that follow from the position controller's."""
-    return {"reference_thrust": position.thrust_max, "reference_tilt": position.tilt_max}
+def reference_limits(position: PositionLimits, bridge: Mapping[str, Any]) -> dict[str, float]:
+    """Return the limits of the mission's reference that follow from other nodes' limits.
+
+    bridge: its raw parameters; without `rate_limit` that of config/bridge counts.
+    """
+    usual = read_sections(configuration.path("bridge/bridge.yaml"))[BRIDGE]
+    largest = bridge.get("rate_limit", usual["rate_limit"])[2]
+    return {
+        "reference_thrust": position.thrust_max,
+        "reference_tilt": position.tilt_max,
+        "reference_yaw_rate": FOLLOWED * largest,
+    }
 
 
 def profile_of(
@@ -240,7 +250,8 @@ def profile_of(
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         values = derived.get(node, {}) | values
         if node == "mission":
-            values = reference_limits(sets["position_controller"]) | values
+            bridge = sections.get(BRIDGE, {})
+            values = reference_limits(sets["position_controller"], bridge) | values
         try:
             kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))

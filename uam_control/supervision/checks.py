@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import FORWARDED, usable
-from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, X, Z
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import tilt
 from uam_control.supervision.monitor import Level, Monitor
@@ -74,6 +74,8 @@ CHECKS = (
     Check(POSES_OFF, "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
           "mocap_distance_hold", failsafe="mocap_distance_hold", in_flight=True,
           failsafe_after="mocap_age_failsafe", blind=True),
+    Check("heading error", "{name} {value:.2f} rad exceeds {limit:g} rad", "heading_error_hold",
+          in_flight=True),
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1,
           reading="battery"),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
@@ -272,7 +274,7 @@ def measure(
     joints: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write the quantities of state and reference into values[:8]; of a state that is not finite
+    """Write the quantities of state and reference into values[:9]; of a state that is not finite
     only values[0].
 
     mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
@@ -297,6 +299,8 @@ def measure(
     values[4] = state[CHI, Z] - ground
     values[5] = outside
     values[6] = _largest(state[CHI, ALPHA:], joints)
+    turn = state[CHI, YAW] - reference[CHI, YAW]
+    values[8] = abs(math.atan2(math.sin(turn), math.cos(turn)))
     values[7] = math.sqrt(apart) if usable(age, FORWARDED) and not math.isnan(apart) else -math.inf
 
 
@@ -309,7 +313,7 @@ def read(
     gain_limits: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write the readings into values[8:].
+    """Write the readings into values[9:].
 
     readings: those of CHECKS; efforts (n,): of the joints [N m], gains (3,): of position, attitude,
     arm, with their limits.

@@ -39,6 +39,7 @@ class SupervisionLimits(ParameterSet):
     tilt_failsafe: float = _failsafe(1.05, "tilt", "rad", 0.05, 3.2)
     body_rate_hold: float = _hold(8.0, "body rate about any axis", "rad/s", 0.1, 100.0)
     body_rate_failsafe: float = _failsafe(15.0, "body rate about any axis", "rad/s", 0.1, 100.0)
+    heading_error_hold: float = _hold(0.7, "error of the yaw angle", "rad", 0.05, 3.1)
     altitude_hold: float = _hold(5.0, "height above take-off", "m", 0.1, 1000.0)
     geofence_low: tuple = vector((-5.0, -5.0, -1.0), _BOX + "smallest x, y, z", "m", -1e4, 1e4, 3)
     geofence_high: tuple = vector((5.0, 5.0, 6.0), _BOX + "largest x, y, z", "m", -1e4, 1e4, 3)
