@@ -21,6 +21,7 @@ KEYS = {
     "mcap": "mcap-ros2-support",  # there is no key for mcap alone, which this one brings
     "serial": "python3-serial",
     "PIL": "python3-pil",
+    "markupsafe": "python3-markupsafe",
     "yaml": "python3-yaml",
 }
 # rosdep has no key for these: docs/install.md installs them by pip
@@ -29,7 +30,7 @@ WITHOUT_KEY = {"dask", "distributed", "imageio_ffmpeg", "optuna", "pyarrow", "vi
 WITHOUT_KEY |= {"gpiod", "motioncapture", "natnet"}
 WITHOUT_KEY |= {"llvmlite"}  # numba brings it
 # imported only where they are installed
-OPTIONAL = {"pandas", "OpenGL", "ament_index_python", "dynamixel_sdk"}
+OPTIONAL = {"pandas", "OpenGL", "ament_index_python", "dynamixel_sdk", "pyulog"}
 
 
 def imported(package):

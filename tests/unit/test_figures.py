@@ -55,8 +55,8 @@ def test_all_figures_are_written_as_png_and_svg(flight, tmp_path):
     steps = []
     found = analyse(flight, load_profile("s500").sets, Vehicle.load(), 0.2)
     written = figures.draw([DrawnFlight("modular", flight, found)], tmp_path, steps.append)
-    assert written == list(figures.FIGURES)
-    assert len(steps) == len(written)
+    assert written == [name for name in figures.FIGURES if name != "px4_log"]  # no PX4 flew
+    assert len(steps) == len(figures.FIGURES)
     for name in written:
         with Image.open(tmp_path / f"{name}.png") as picture:
             assert picture.width == 1536

@@ -25,7 +25,7 @@ from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, 
 from uam_msgs_py.node.taking import Taker
 
 LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
-NAMES_PERIOD = 1.0  # s of wall time between two looks at who publishes a topic
+NAMES_PERIOD = 0.1  # s of wall time between two looks at who publishes a topic
 
 T = TypeVar("T")
 

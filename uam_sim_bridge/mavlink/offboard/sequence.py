@@ -250,7 +250,9 @@ class OffboardSequence:
         long this process has not run, by another clock than that of the ticks: old ticks may come
         first. If none is missing after them, the time of the ticks stood still, too.
         """
-        if self.phase is Phase.FLYING and not self.let_go and time - self._streamed > loss_time:
+        # a little longer: a failsafe that has just begun, or not quite, is seen by its report
+        lost = time - self._streamed > loss_time + SETTLING
+        if self.phase is Phase.FLYING and not self.let_go and lost:
             self._stream_lost = self._resumed = time
             self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
         elif self.withheld and time - self._begun > loss_time:
@@ -265,8 +267,8 @@ class OffboardSequence:
 
         The autopilot returns to OFFBOARD with the first setpoint: the vehicle may stand by now.
         """
-        new = self._begun - self._resumed >= NEW_REPORTS
-        return self._begun < self._current or (self.phase is Phase.RELEASED and not new)
+        old = self._begun < self._resumed + NEW_REPORTS
+        return self._begun < self._current or (self.phase is Phase.RELEASED and old)
 
     @property
     def after_loss(self) -> bool:
