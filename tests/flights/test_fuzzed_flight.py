@@ -59,8 +59,14 @@ def complete(flight):
     assert not {name for name in lost if "/uam/state" in name or "/imu/" in name}
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("options", [(), ("--fused",)], ids=["separate", "fused"])
+# slow: a fused flight of 20 s can be over before the fuzzer has started
+FUSED = pytest.param(("--fused",), marks=pytest.mark.slow, id="fused")
+
+
+SEPARATE = pytest.param((), marks=pytest.mark.long, id="separate")
+
+
+@pytest.mark.parametrize("options", [SEPARATE, FUSED])
 def test_a_fuzzed_flight_ends_complete_with_every_node_alive(fly, tmp_path, options):
     scenario = tmp_path / "hover.yaml"
     scenario.write_text(SHORT.replace("from: 2,", "from: 20,").replace("at: 2,", "at: 20,"))
