@@ -1,10 +1,11 @@
 """A process that publishes malformed, extreme and deep messages on every topic that somebody reads.
 
-    python tests/fuzz_topics.py [--seconds 600] [--seed 1] [--rate 400]
+    python tests/fuzz_topics.py [--seconds 600] [--seed 1] [--rate 400] [--each 30]
 
 ROS_DOMAIN_ID and the transport come from the environment. The topics come from the ROS graph, so a
 new topic is covered by itself. Some messages are those of the flight with changed bytes, numbers
-and texts. At the end it prints how many messages each topic got, as JSON.
+and texts. It prints "covered" when each topic got as many messages as `--each` says, and at the end
+how many it got, as JSON.
 """
 
 import argparse
@@ -46,7 +47,7 @@ HEAD = b"\0\1\0\0"
 
 def broken(rng: random.Random, seen: bytes) -> bytes:
     """Return bytes that are no message, or one with damage; seen: a message of the topic."""
-    kind = rng.randrange(7)
+    kind = rng.randrange(8)
     if kind == 0:
         return rng.choice((b"", b"\0", HEAD, HEAD + b"\xff" * 8, b"\0\0\0\0" + seen[4:]))
     if kind == 1:
@@ -56,6 +57,8 @@ def broken(rng: random.Random, seen: bytes) -> bytes:
     if kind == 3:
         return seen + rng.randbytes(rng.randrange(5000))
     data = bytearray(seen)
+    if kind == 7:
+        return no_text(rng, data)
     for _ in range(rng.randrange(1, 6)):
         if len(data) < 16:
             break
@@ -68,6 +71,15 @@ def broken(rng: random.Random, seen: bytes) -> bytes:
             at = 4 + 8 * rng.randrange((len(data) - 4) // 8)
             data[at : at + 8] = struct.pack("<d", rng.choice(NUMBERS))
     return bytes(data)
+
+
+def no_text(rng: random.Random, data: bytes) -> bytes:
+    """Return `data` with some letters replaced by bytes that are not UTF-8."""
+    damaged = bytearray(data)
+    letters = [at for at in range(4, len(data)) if data[at : at + 1].isalpha()]
+    for at in letters[:: rng.randrange(1, 9)]:
+        damaged[at] = rng.choice(b"\xff\xc3\xed\xf4\x80")
+    return bytes(damaged)
 
 
 def extreme(rng: random.Random, message, share: float):
@@ -161,6 +173,8 @@ class Target:
             share = 1.0 if self._plan else rng.choice((0.1, 0.5, 1.0))
             message = extreme(rng, base or self.kind(), share)
             data = self._read(serialize_message(message)) and serialize_message(message)
+            if data and rng.random() < 0.1:
+                data = no_text(rng, data)
         if self._plan and data is None:
             data = broken(rng, HEAD + b"\xff" * rng.randrange(300))
         with suppress(RCLError):  # the middleware does not send everything
@@ -182,17 +196,21 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--rate", type=float, default=400.0, help="messages per second, all topics")
+    parser.add_argument("--each", type=int, default=30, help="messages until a topic is covered")
     options = parser.parse_args()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node, rng = Node(NAME, start_parameter_services=False, enable_rosout=False), random.Random()
     rng.seed(options.seed)
     known: dict[str, Target] = {}
-    end, looked = time.monotonic() + options.seconds, 0.0
+    end, looked, covered = time.monotonic() + options.seconds, 0.0, False
     with suppress(KeyboardInterrupt):
         while (now := time.monotonic()) < end:
             if now - looked > LOOK_PERIOD:
                 looked = now
                 targets(node, known)
+                if not covered and known and min(t.sent for t in known.values()) >= options.each:
+                    covered = True
+                    print("covered", flush=True)
             for target in list(known.values()):
                 target.listen()
                 target.send(rng)
