@@ -6,6 +6,7 @@ pytest.importorskip("rclpy")
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
+from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.refusals import Refusals
@@ -20,6 +21,11 @@ def test_by_default_each_node_of_the_stack_is_the_only_publisher_of_its_topics()
     for topic, publisher in PUBLISHERS.items():
         sensor = publisher == wiring.PLANT
         assert nodes.of(topic) == Rightful(f"/uav1/{publisher}", only=not sensor)
+
+
+def test_each_topic_of_one_publisher_that_nodes_act_on_has_a_rightful_one():
+    assert {one.name for one in topics.RECORDED if one.one_publisher} <= set(PUBLISHERS)
+    assert RightfulNodes("/").of(topics.RESTARTS.name) == Rightful("/uam_fly", True)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import development as mavlink2
 
+from uam_control.settings.visible_text import visible
 from uam_sim_bridge.mavlink.protocol.wire import (
     UNREAD,
     Codec,
@@ -112,7 +113,7 @@ def test_long_texts_are_joined(text):
     for message in text_chunks(4, text, 3):
         found = Framer(codec).datagram(codec.encode(message))
         whole = assembler.add(found[0])
-    assert whole == text
+    assert whole == visible(text)
 
 
 def test_lost_piece_of_a_text_gives_no_text():

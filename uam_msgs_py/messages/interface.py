@@ -63,7 +63,9 @@ CONTENTS = {
     topics.CHECKLIST: Content(
         "", "text", "5 Hz before a flight", "checklist", "mission, cockpit, uam"
     ),
-    topics.GOAL_POSE: Content(WORLD, "m, quaternion", ON_CHANGE, PLANNERS, "mission"),
+    topics.GOAL_POSE: Content(
+        WORLD, "m, quaternion", ON_CHANGE, f"{PLANNERS}, cockpit, uam goto", "mission"
+    ),
     topics.BASE_TRAJECTORY: Content(
         WORLD, "m, quaternion; /s; /s²", ON_CHANGE, PLANNERS, "mission"
     ),

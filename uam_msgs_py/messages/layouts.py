@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from uam_control.settings.visible_text import visible
 from uam_control.stamps import SECOND
 
 ENCAPSULATION = 4
@@ -30,8 +31,8 @@ class BadMessage(ValueError):
     """An invalid message; the text is one line: what is wrong, what is expected."""
 
     def __init__(self, text: str) -> None:
-        """text: may contain parts of the message, of any length."""
-        line = " ".join(text.split())
+        """text: may contain parts of the message, of any length and with control characters."""
+        line = visible(" ".join(text.split()))
         super().__init__(line if len(line) <= LONGEST_TEXT else f"{line[:LONGEST_TEXT]}...")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from uam_msgs_py.messages.json_text import read_json
+from uam_control.settings.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import OK, WARN, diagnostic, only_status
 

@@ -13,7 +13,7 @@ from typing import Self
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_msgs_py.messages.json_text import read_json
+from uam_control.settings.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ERROR, OK, STALE
 

@@ -228,7 +228,6 @@ RESTARTS = Topic(
     DiagnosticArray,
     _qos(100, latched=True),
     "nodes that uam fly starts again after a loss; name: the node",
-    one_publisher=False,
 )
 
 # True values, from the simulator only

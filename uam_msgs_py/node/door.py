@@ -9,6 +9,7 @@ discard them without a word.
 
 from __future__ import annotations
 
+import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from uam_control.settings.visible_text import visible
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.node.refusals import Refusals
@@ -117,7 +119,8 @@ class Door:
         reason = str(error if expected else BadMessage(f"{type(error).__name__}: {error}"))
         self.refusals.note(topic, sender, rightful, reason)
         if not expected and self.due(f"{topic} {type(error).__name__}"):
-            traceback.print_exception(error)  # perhaps an error of the program
+            for line in "".join(traceback.format_exception(error)).splitlines():
+                print(visible(line), file=sys.stderr, flush=True)  # perhaps an error of the program
         if self._tells and self.due(topic):
             self._node.get_logger().warning(f"{topic}: message refused: {reason}")
 

@@ -25,6 +25,7 @@ from uam_control.settings.parameter_set import (
     Switch,
     Text,
 )
+from uam_control.settings.visible_text import visible
 from uam_msgs_py.node.namespace import shared_section
 
 S = TypeVar("S", bound=ParameterSet)
@@ -115,7 +116,7 @@ class NodeParameters(Generic[S]):
         try:
             self._candidate(changes)
         except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=False, reason=visible(error))
         return SetParametersResult(successful=True)
 
     def _swap(self, changes: list[Parameter]) -> None:

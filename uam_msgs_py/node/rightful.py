@@ -29,6 +29,7 @@ PUBLISHERS = {wire.topic.name: wire.publisher for wire in wiring.WIRES} | {
     topics.PREFLIGHT.name: wiring.MISSION,
     topics.CHECKLIST.name: wiring.CHECKLIST,
     topics.RECORDED_UNTIL.name: wiring.RECORDER,
+    topics.RESTARTS.name: wiring.FLIGHT,
 }
 ALLOWED = "NODE=NAME or TOPIC=NAME with commas between; NAME 'any': the first that sends"
 

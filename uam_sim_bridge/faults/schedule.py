@@ -26,6 +26,7 @@ from typing import Any
 
 from uam_control.mission import Scenario
 from uam_control.settings import yaml_file
+from uam_control.settings.json_text import read_mapping
 from uam_sim_bridge.faults.fault import Fault, FaultError
 from uam_sim_bridge.faults.fault_catalogue import make
 
@@ -95,12 +96,11 @@ class Schedule:
         """Return the schedule of a text by `to_text`; raises FaultError in one line."""
         if not text:
             return cls()
-        try:
-            document = json.loads(text)
-            entries, seed = document["faults"], int(document["seed"])
-        except (ValueError, KeyError, TypeError):
-            raise FaultError('faults: {"seed": N, "faults": [...]} expected, as JSON') from None
-        where = "faults"
+        where, expected = "faults", 'faults: {"seed": N, "faults": [...]} expected, as JSON'
+        document = read_mapping(text, FaultError, expected)
+        entries, seed = document.get("faults"), document.get("seed")
+        if not isinstance(seed, int):
+            raise FaultError(expected)
         return cls(tuple(timed(entry, None, where) for entry in listed(entries, where)), seed)
 
 

@@ -83,7 +83,7 @@ class Rehearsal:
         self, node: Node, vehicle: VehicleDescription, p: LaboratoryParameters, stop: StopSignal
     ) -> None:
         self._node, self._p, self._stop = node, p, stop
-        numbers = Vehicle.of(vehicle).changed(json.loads(p.vehicle_changes))
+        numbers = Vehicle.of(vehicle).changed(p.changes())
         faults = Schedule.from_text(p.faults).only(CABLE)
         folder = Path(p.folder)
         folder.mkdir(parents=True, exist_ok=True)

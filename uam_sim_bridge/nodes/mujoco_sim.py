@@ -102,7 +102,7 @@ class Simulator:
         self.node, self.options, self._stop = node, options, stop
         self._log = node.get_logger()
         named = presets.read(tuple(filter(None, options.plant_preset.split(","))))
-        changes = presets.added({}, named) | json.loads(options.vehicle_changes)
+        changes = presets.added({}, named) | options.changes()
         vehicle = Vehicle.of(declared.vehicle).changed(changes)
         described = vehicle.description
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
@@ -491,7 +491,7 @@ def main() -> int:
         refuse_unknown(node)
         try:
             simulator = Simulator(node, options, stop)
-        except (ValueError, KeyError, OSError) as error:
+        except (ValueError, OSError) as error:
             return refuse(NAME, error)
         try:
             simulator.wait_for_nodes()

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
-from uam_control.settings.parameter_set import ParameterSet, integer, number, text, vector
+from uam_control.settings.json_text import read_mapping
+from uam_control.settings.parameter_set import (
+    ParameterError,
+    ParameterSet,
+    integer,
+    number,
+    text,
+    vector,
+)
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 
@@ -28,3 +37,8 @@ class SimulatedParameters(ParameterSet):
     )
     hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
     statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
+
+    def changes(self) -> dict[str, Any]:
+        """Return the entries to replace, for `Vehicle.changed`; raises ParameterError."""
+        expected = 'vehicle_changes: JSON expected, as {"air.gust": 1.0}'
+        return read_mapping(self.vehicle_changes, ParameterError, expected)

@@ -55,15 +55,18 @@ class Vehicle:
         return cls(description, {"effects": {}} | description.numbers)
 
     def changed(self, changes: dict[str, object]) -> Vehicle:
-        """Return a copy with dotted entries replaced, e.g. {"air.gust": 1.0}."""
+        """Return a copy with dotted entries replaced, e.g. {"air.gust": 1.0}.
+
+        Raises VehicleError for an entry that is not there.
+        """
         numbers = deepcopy(self.numbers)
         for dotted, value in changes.items():
             *parents, last = dotted.split(".")
             entry = numbers
             for parent in parents:
-                entry = entry[parent]
-            if last not in entry:
-                raise KeyError(f"vehicle has no '{dotted}'")
+                entry = entry.get(parent) if isinstance(entry, dict) else None
+            if not isinstance(entry, dict) or last not in entry:
+                raise VehicleError(f"vehicle has no '{dotted}'")
             entry[last] = value
         return Vehicle(self.description, numbers)
 

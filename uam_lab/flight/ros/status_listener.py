@@ -13,6 +13,7 @@ from uam_lab.flight.observer import FlightStatus
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.node import wiring
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
@@ -37,7 +38,7 @@ class StatusListener(Guest):
         publishers: str = "",
     ):
         """See `Guest`; publishers: the parameter of that name of the flight's nodes."""
-        super().__init__("uam_fly", environment, domain, namespace, arguments)
+        super().__init__(wiring.FLIGHT, environment, domain, namespace, arguments)
         self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
         self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
         rightful = RightfulNodes(self.node.get_namespace(), publishers)

@@ -12,6 +12,7 @@ import struct
 
 from pymavlink.dialects.v20 import development as mavlink2
 
+from uam_control.settings.visible_text import visible
 from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
 
 MARKER_1, MARKER_2 = 0xFE, 0xFD
@@ -207,10 +208,10 @@ class TextAssembler:
         self._pieces: list[str] = []
 
     def add(self, message: Message) -> str | None:
-        """Return the whole text with its last piece, None before or if a piece is missing."""
+        """Return the whole text, in one line, with its last piece; None before or without one."""
         text = clean_text(message.text)
         if message.id == 0:
-            return text
+            return visible(text)
         if message.id != self._identity or message.chunk_seq == 0:
             self._identity, self._pieces = message.id, []
         if message.chunk_seq != len(self._pieces):  # a piece was lost
@@ -220,7 +221,7 @@ class TextAssembler:
         if len(text.encode()) == 50:
             return None
         whole, self._pieces = "".join(self._pieces), []
-        return whole
+        return visible(whole)
 
 
 def clean_text(value: str | bytes) -> str:

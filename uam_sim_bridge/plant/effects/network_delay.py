@@ -14,6 +14,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from uam_control.settings.json_text import read_mapping
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
 
 BLOCK = 4096  # draws per call of the generator; the sequence is the same for any
@@ -71,10 +72,11 @@ class SetpointDelay:
         """Return the delay that `to_text` wrote; None for an empty text. Raises ValueError."""
         if not text:
             return None
+        refusal = f"network_delay: {text[:80]!r} is not valid"
         try:
-            return cls(**json.loads(text))
-        except (TypeError, json.JSONDecodeError):
-            raise ValueError(f"network_delay: {text!r} is not valid") from None
+            return cls(**read_mapping(text, ValueError, refusal))
+        except TypeError:
+            raise ValueError(refusal) from None
 
     def to_text(self) -> str:
         """Return it as text for a parameter."""
