@@ -16,7 +16,7 @@ import pytest
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.supervision import Event, State
-from uam_lab.campaign.fault_outcome import classify
+from uam_lab.campaign.fault_outcome import classify, ending
 from uam_lab.cli.main import main
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
@@ -131,6 +131,22 @@ def test_without_poses_it_leaves_the_stand_before_the_autopilot_descends(text):
     beside = np.hypot(series["truth.x"] + 0.789, series["truth.y"])[low & (series.time > 5.0)]
     assert beside.min() > 0.3
     assert np.abs(series["truth.pitch"]).max() < 0.35
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mavlink_cut@pick+2.2",
+        "mavlink_cut@pick+2.45",
+        "mavlink_cut@pick+2.2:direction=to_autopilot",
+    ],
+)
+def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
+    flight, series, figures = flown(text, scenario=QUICK_PICK, seed=2)
+    assert classify(series, figures) == "failsafe" and not flight.armed
+    end = ending(series)
+    assert end.largest_tilt < 0.2 and end.impact < 0.9  # stiff: 0.58 rad, 1.3 m/s
+    assert not flight.mission.output.magnet
 
 
 @pytest.mark.parametrize("text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4"])

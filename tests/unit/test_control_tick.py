@@ -36,6 +36,9 @@ class Port:
     def connected(self, time):
         return True
 
+    def silent(self, time):
+        return False
+
     def poll(self, time):
         pass
 

@@ -239,6 +239,61 @@ def test_a_bad_promise_is_refused_in_one_line(tmp_path, promise, message):
         fault_matrix.read(file, "direct")
 
 
+RANDOM = MATRIX.with_name("random.yaml")
+
+
+def test_drawn_flights_are_the_same_ones_and_within_their_ranges():
+    few, many = (fault_matrix.read(RANDOM, "direct", draws=count) for count in (20, 200))
+    cells = many.cells(3)[1:]
+    assert few.cells(3)[1:] == cells[:20] and many.cells(4)[1:] != cells
+    pairs = [cell for cell in cells if len(cell.schedule.faults) == 2]
+    assert 70 < len(pairs) < 130 and all(cell.fault.endswith(" and another") for cell in pairs)
+    assert {cell.fault for cell in cells} <= set(many.rows)
+    assert {cell.moment for cell in cells} == set(many.moments)
+    flown = [one for cell in cells for one in cell.schedule.faults]
+    lasting = {one.duration for one in flown}
+    assert {1.0, 1.15, 1.5, 3.0, np.inf} <= lasting and len(lasting) > 20
+    assert all(0.1 <= one <= 5.0 or one == np.inf for one in lasting)
+    late = [one.fault.delay for one in flown if one.fault.NAME == "mocap_latency"]
+    assert late and all(0.02 <= one <= 1.2 for one in late)
+
+
+@pytest.mark.parametrize(
+    ("text", "draws", "message"),
+    [
+        ("faults: [{fault: mocap_jump, x: [0, 1]}]", 0, "x: [0, 1]: a range needs --draws"),
+        ("faults: [{fault: mocap_jump, x: [1, 0]}]", 9, "x: [1, 0]: two numbers [low, high]"),
+        ("faults: [{fault: mocap_jump, x: [0, 99]}]", 9, "x: 99"),
+        ("faults: [{fault: mocap_jump}], durations: 3", 9, "durations: a list of times"),
+        ("faults: [{fault: mocap_jump}], durations: [-1]", 9, "duration: -1 is not a time"),
+    ],
+)
+def test_a_range_is_checked_at_both_ends_and_needs_draws(tmp_path, text, draws, message):
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"{{scenario: hover, moments: {{a: {{at: 3}}}}, {text}}}")
+    with pytest.raises(FaultError, match=f"mine.yaml: .*{re.escape(message)}"):
+        fault_matrix.read(file, "direct", draws=draws)
+
+
+def test_durations_are_those_of_every_row_without_its_own(tmp_path):
+    file = tmp_path / "mine.yaml"
+    rows = "[{fault: mocap_dropout}, {fault: imu_dropout, duration: 9}]"
+    file.write_text(
+        f"{{scenario: hover, moments: {{a: {{at: 3}}}}, durations: [1, null], faults: {rows}}}"
+    )
+    rows = fault_matrix.read(file, "direct").rows
+    assert rows == ("mocap_dropout 1 s", "mocap_dropout", "imu_dropout 9 s")
+
+
+def test_a_lost_flight_is_listed_with_its_command(tmp_path):
+    matrix = fault_matrix.read(MATRIX, "direct", ["motor_loss"], ["landing"])
+    given = "motor_loss@land+1.5:remaining=0.0 mavlink_cut@1.0"
+    lost = FaultResult(matrix.rows[0], "landing", "lost", "it fell", 9.0, given=given)
+    summary, page = fault_report.write(tmp_path, matrix, [lost], "s500_arm", "uam faults", "uam it")
+    command = "uam it --fault motor_loss@land+1.5:remaining=0.0 --fault mavlink_cut@1.0"
+    assert f"| {command} |" in summary and command in page.read_text()
+
+
 def test_a_cell_flown_several_times_shows_the_worst(tmp_path):
     errors = {"position_m": [0.1, None, None]}
     results = [

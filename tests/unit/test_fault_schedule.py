@@ -54,6 +54,17 @@ def faults(draw):
     return kind.from_mapping(values)
 
 
+@given(
+    st.builds(TimedFault, faults(), times, times | st.just(math.inf), st.sampled_from(["", "pick"]))
+)
+def test_the_option_text_of_a_fault_is_read_back(fault):
+    entry = parse_spec(fault.text)
+    assert timed(entry, None, "") == fault
+    assert fault.text.count("=") == sum(
+        value != getattr(type(fault.fault)(), name) for name, value in fault.fault.values.items()
+    )
+
+
 @given(st.lists(st.builds(TimedFault, faults(), times, times | st.just(math.inf)), max_size=4))
 def test_a_schedule_is_read_back_from_the_parameter_of_a_node_and_from_a_file(found):
     made = Schedule(tuple(found), 7)

@@ -53,6 +53,21 @@ def assert_smooth(references):
         assert np.max(np.abs(middle[:, 2, part])) < acceleration
 
 
+def test_an_arm_that_gives_way_stays_where_it_was_pushed_and_returns_smoothly():
+    guide, pushed = guidance(), np.array([0.3, 1.2])
+    fly(guide, 0.0, 3.0, [(1.0, lambda stamp: guide.stop(stamp, stow=False))])
+    base = guide.motion[:, :6].copy()
+    for _ in range(3):
+        guide.write(103.0)
+        guide.give_way(103.0, pushed)
+        assert np.array_equal(guide.reference[0, 6:], pushed) and not guide.reference[1:, 6:].any()
+        guide.give_way(103.0, np.array([np.nan, 0.0]))  # no change
+    assert np.array_equal(guide.motion[:, :6], base)
+    after = fly(guide, 3.0, 12.0, [(4.0, guide.go_on)])
+    assert np.array_equal(after[50, 0, 6:], pushed)
+    assert_smooth(after)
+
+
 def test_undisturbed_it_is_the_trajectory_itself_bit_for_bit():
     guide, expected = guidance(), empty_motion(2)
     trajectory = load_scenario("pick_and_place").trajectory(START)

@@ -172,6 +172,7 @@ def test_a_battery_that_only_sys_status_reports(rig):
 def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):
     rig.fly().cut = True
     rig.run(0.2)
+    assert not rig.link.silent(rig.time)
     rig.cut = False
     rig.run(1.0)
     assert rig.sequence.phase is Phase.FLYING and rig.autopilot.status.mode is Mode.OFFBOARD
@@ -188,8 +189,10 @@ def test_cut_of_two_seconds_is_a_failsafe_and_the_vehicle_stays_released(rig):
     rig.run(2.0)
     assert rig.autopilot.status.mode is Mode.LAND and rig.link.connected(rig.time)
     assert rig.sequence.phase is Phase.FLYING and rig.sequence.streaming
+    assert rig.link.silent(rig.time)  # it may be descending, for all that is known
     rig.cut = False
     rig.run(2.0)
+    assert not rig.link.silent(rig.time)
     assert rig.sequence.phase is Phase.RELEASED and rig.sequence.streaming
     assert rig.sequence.released_to == (
         "the autopilot's failsafe after a lost stream of setpoints, in LAND"

@@ -101,6 +101,7 @@ class Mission:
         self._override = MagnetOverride()
         self._descent: Decision | None = None  # to land, while the reference slows down for it
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
+        self._beside: bool | None = None  # a stand, when the autopilot's own landing began
         self._ground_pose = GroundPose()
         self._followed: Decision | None = None  # the newest decision whose values are in the output
         self._in_flight: Observation | None = None  # of every tick after the take-off
@@ -238,6 +239,7 @@ class Mission:
                     self.plans_flown += 1
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
+            self._give_way(stamp, seen)
             self._follow(stamp, decision)
             self.watch_payload()
             if output.state is State.GROUNDED and not output.arm:
@@ -417,6 +419,26 @@ class Mission:
         output.phase = self._phase(decision)
         output.magnet = self._magnet_on(decision)
 
+    def _give_way(self, stamp: float, seen: Observation) -> None:
+        """Let the arm yield while the autopilot comes down by itself beside a payload's stand.
+
+        A stiff arm on the stand levers the vehicle over.
+        """
+        guidance, held = self._guidance, seen.authority
+        lands = held.lands and not held.landed and guidance is not None
+        flying = self.output.state is State.FLYING  # nobody has stopped it
+        if not lands:
+            if self._beside and flying:
+                guidance.go_on(stamp)
+            self._beside = None
+            return
+        if self._beside is None:
+            self._beside = bool(np.any(self._watch.clear(guidance.motion[CHI])))
+            if self._beside and flying:
+                guidance.stop(stamp, stow=False)
+        if self._beside:
+            guidance.give_way(stamp, seen.state[CHI, ARM])
+
     def _descend(self, stamp: float) -> None:
         """Begin the descent of an unplanned landing, vertically from the vehicle's position."""
         stow, self._descent = self._descent.stow, None
@@ -518,7 +540,8 @@ class Mission:
         given = self._override.value(desired)
         if given is not None:
             return given
-        if decision.guide is Guide.DESCEND and self.output.grasp is Grasp.APPROACHED:
+        down = self._beside or decision.guide is Guide.DESCEND
+        if down and self.output.grasp is Grasp.APPROACHED:
             return False  # a payload that is not lifted yet: the arm would pull on its stand
         left = self.output.grasp in (Grasp.GIVEN_UP, Grasp.ABSENT)
         return desired and decision.keep_magnet and not left

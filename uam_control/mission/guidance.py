@@ -238,9 +238,7 @@ class Guidance:
         self._brake = Braking(stamp - age, state, self.parameters, ground)
         angles = state[CHI, ARM]
         if np.any(np.abs(angles - self.motion[CHI, ARM]) > self.parameters.start_arm_error):
-            self.motion[CHI, ARM], self.motion[CHI_DOT:, ARM] = angles, 0.0
-            self._plans.pop(False, None)
-            self._arm = self._arm_segment(stamp, angles)
+            self.give_way(stamp, angles)
         self.write(stamp)
 
     @property
@@ -271,6 +269,16 @@ class Guidance:
         """Move the arm to `angles` [rad] from `stamp` [s] on; None: stow it."""
         self._arm = self._arm_segment(stamp, self._stowed if angles is None else angles)
         self._plans.pop(False, None)
+
+    def give_way(self, stamp: float, angles: np.ndarray) -> None:
+        """Let the arm yield to what pushes it: its reference is its `angles` (n,) [rad], at rest.
+
+        Call it after `write`, at each tick; afterwards the arm stays where it is.
+        """
+        if np.all(np.isfinite(angles)):
+            self.motion[CHI, ARM], self.motion[CHI_DOT:, ARM] = angles, 0.0
+            self.move_arm(stamp, angles)
+            self._publish()
 
     def go_on(self, stamp: float) -> None:
         """Continue on the path once the stop is complete and the arm is back at its path angles.

@@ -28,9 +28,9 @@ class Authority(NamedTuple):
     """Who has control of the vehicle.
 
     released_to: who has it in place of the companion, "" if nobody has. landed: whether the
-    autopilot reports that the vehicle stands on the ground. lands: whether the autopilot's mode
-    brings the vehicle to the ground by itself. failed: why the bridge flies no more, "" while it
-    may. stopped: a kill has ended the flight for good.
+    autopilot reports that the vehicle stands on the ground. lands: whether the autopilot brings the
+    vehicle to the ground by itself: by its mode, or for all that is known of a silent one. failed:
+    why the bridge flies no more, "" while it may. stopped: a kill has ended the flight for good.
     """
 
     released_to: str = ""

@@ -45,12 +45,14 @@ class OutcomeLimits:
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a flight: height above the start [m], tilt [rad], speed [m/s], impact [m/s]."""
+    """The end of a flight: height above the start [m], tilt [rad], speed [m/s], impact [m/s], and
+    the largest tilt of the flight [rad]."""
 
     height: float
     tilt: float
     speed: float
     impact: float
+    largest_tilt: float
 
 
 def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
@@ -58,13 +60,14 @@ def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
     limits = limits or OutcomeLimits()
     height = series["truth.z"] - series["truth.z"][0]
     velocity = np.column_stack([series[f"truth.{axis}_dot"] for axis in "xyz"])
-    roll, pitch = series["truth.roll"][-1], series["truth.pitch"][-1]
+    tilts = np.arccos(np.clip(np.cos(series["truth.roll"]) * np.cos(series["truth.pitch"]), -1, 1))
     low = height < limits.near_ground
     return Ending(
         height=float(height[-1]),
-        tilt=float(np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0))),
+        tilt=float(tilts[-1]),
         speed=float(np.linalg.norm(velocity[-1])),
         impact=float(max(0.0, np.max(-velocity[low, 2]))) if low.any() else 0.0,
+        largest_tilt=float(np.nanmax(tilts)),
     )
 
 

@@ -46,15 +46,24 @@ HEAD = (
     "down_after_s",
     "promise_kept",
     "why",
+    "given",
+    "tilt_deg",
+    "impact_m_s",
 )
+LOST_HEAD = ["lost, to repeat it", "largest tilt [°]", "at the ground [m/s]", "why"]
 
 
 def write(
-    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str
+    out: Path,
+    matrix: Matrix,
+    results: Sequence[FaultResult],
+    vehicle: str,
+    command: str,
+    again: str = "uam fly",
 ) -> tuple[str, Path]:
     """Write flights.csv, faults.json, summary.md, matrix.png, report.html; return summary, page.
 
-    vehicle: its name.
+    vehicle: its name; again: the command that repeats a flight, without its faults.
     """
     write_rows(
         out / "flights.csv",
@@ -69,6 +78,8 @@ def write(
                 "" if r.down_after_s is None else f"{r.down_after_s:.2f}",
                 "" if r.kept is None else r.kept,
                 r.why,
+                r.given,
+                *(_shown(math.nan if one is None else one) for one in (r.tilt_deg, r.impact)),
             ]
             for r in results
         ),
@@ -76,7 +87,19 @@ def write(
     facts = {"command": command, "vehicle": vehicle, "versions": versions()}
     facts |= {"matrix": asdict(matrix), "flights": [vars(result) for result in results]}
     write_json(out / "faults.json", facts)
+    lost = [r for r in results if r.outcome == LOST]
+    lost_rows = [
+        [
+            " --fault ".join([again, *r.given.split()]),
+            _rounded(r.tilt_deg, 0),
+            _rounded(r.impact, 2),
+            r.why,
+        ]
+        for r in lost
+    ]
     summary = markdown(matrix, results, vehicle, command)
+    if lost:
+        summary += f"\n{templates.markdown_table(LOST_HEAD, lost_rows)}\n"
     write_text(out / "summary.md", summary)
     with style.styled():
         style.save(picture(matrix, results), out / "matrix.png")
@@ -92,6 +115,7 @@ def write(
         picture=templates.embedded(out / "matrix.png"),
         command=command,
         rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
+        lost=lost_rows,
     )
     write_text(page, text)
     return summary, page
@@ -152,10 +176,10 @@ def sentence(results: Sequence[FaultResult]) -> str:
 
 def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str) -> str:
     """Return the matrix as a Markdown table: outcome and largest position error."""
-    cells = grouped(results)
+    cells, rows = grouped(results), _flown(matrix, results)
     table = templates.markdown_table(
         ["fault", *matrix.moments],
-        ([row, *(_text(cells, row, moment) for moment in matrix.moments)] for row in matrix.rows),
+        ([row, *(_text(cells, row, moment) for moment in matrix.moments)] for row in rows),
     )
     outcomes = "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
     parts = [
@@ -172,7 +196,7 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, comma
 
 def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     """Draw the matrix in colours, with the largest position error in each cell."""
-    rows, columns = matrix.rows, list(matrix.moments)
+    rows, columns = _flown(matrix, results), list(matrix.moments)
     cells = grouped(results)
     figure = Figure(figsize=(style.WIDTH, 1.3 + 0.27 * len(rows)), layout="constrained")
     axis = figure.subplots()
@@ -199,6 +223,12 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
 Cells = dict[tuple[str, str], Group]
 
 
+def _flown(matrix: Matrix, results: Sequence[FaultResult]) -> list[str]:
+    """Return the rows with flights."""
+    flown = {result.fault for result in results}
+    return [row for row in matrix.rows if row in flown]
+
+
 def _text(cells: Cells, row: str, moment: str) -> str:
     """Return the text of a cell, "" for one that was not flown."""
     return str(cells[row, moment]) if (row, moment) in cells else ""
@@ -206,6 +236,10 @@ def _text(cells: Cells, row: str, moment: str) -> str:
 
 def _colour(cells: Cells, row: str, moment: str) -> tuple[float, float, float]:
     return to_rgb(COLOURS[cells[row, moment].outcome] if (row, moment) in cells else "white")
+
+
+def _rounded(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
 
 
 def _shown(value: float) -> str:

@@ -14,8 +14,8 @@ from uam_lab.results.metrics import plain
 
 NESTED = ("worst", "happened")  # JSON in the table
 TYPES = {
-    **dict.fromkeys(("fault", "moment", "outcome", "why"), pa.string()),
-    **dict.fromkeys(("duration_s", "down_after_s"), pa.float64()),
+    **dict.fromkeys(("fault", "moment", "outcome", "why", "given"), pa.string()),
+    **dict.fromkeys(("duration_s", "down_after_s", "tilt_deg", "impact"), pa.float64()),
     "kept": pa.bool_(),
 }
 SCHEMA = pa.schema(

@@ -8,7 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from uam_lab.campaign.fault_matrix import Cell
-from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
+from uam_lab.campaign.fault_outcome import (
+    COMPLETED,
+    LOST,
+    classify,
+    down_after,
+    ending,
+)
 from uam_lab.campaign.trial import Trial, figures_of, fly
 from uam_lab.results.outcome import Outcome
 
@@ -28,7 +34,8 @@ class FaultResult:
     down_after_s: from the fault to the final touchdown, None if the mission was completed or
     without touchdown. kept: whether the promise was kept, None without a promise. worst: largest
     errors of the flight, with the keys of `max` in metrics.json. happened: the injected faults, see
-    `faults.timeline.record`.
+    `faults.timeline.record`. given: the faults as option texts; tilt_deg: the largest; impact:
+    speed at the ground [m/s]; None without a recording.
     """
 
     fault: str
@@ -40,6 +47,9 @@ class FaultResult:
     happened: tuple[dict[str, Any], ...] = ()
     down_after_s: float | None = None
     kept: bool | None = None
+    given: str = ""
+    tilt_deg: float | None = None
+    impact: float | None = None
 
 
 def measure(flight: FaultTrial) -> FaultResult:
@@ -53,22 +63,28 @@ def measure(flight: FaultTrial) -> FaultResult:
 def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> FaultResult:
     """Return the result of a flight; figures: its metrics, None without a recording."""
     series, promise = outcome.series, cell.promise
+    given = " ".join(one.text for one in cell.schedule.faults)
     if series is None or figures is None:
         broken = None if promise is None else False
-        return FaultResult(cell.fault, cell.moment, LOST, outcome.reason, 0.0, kept=broken)
-    ending = classify(series, figures)
+        return FaultResult(
+            cell.fault, cell.moment, LOST, outcome.reason, 0.0, kept=broken, given=given
+        )
+    end, came_to = ending(series), classify(series, figures)
     begun = min((one["begin_s"] for one in outcome.faults), default=math.nan)
-    unknown = ending == COMPLETED or math.isnan(begun)
+    unknown = came_to == COMPLETED or math.isnan(begun)
     down = None if unknown else down_after(series, begun)
     why = "; ".join([*figures["shortfalls"], *outcome.notes])
     return FaultResult(
         fault=cell.fault,
         moment=cell.moment,
-        outcome=ending,
+        outcome=came_to,
         why=why,
         duration_s=figures["duration_s"],
         down_after_s=down,
-        kept=None if promise is None else promise.kept(ending, down, why),
+        kept=None if promise is None else promise.kept(came_to, down, why),
         worst=figures["max"],
         happened=tuple(outcome.faults),
+        given=given,
+        tilt_deg=math.degrees(end.largest_tilt),
+        impact=end.impact,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -44,6 +45,7 @@ examples:
   uam faults --only motor_loss --vehicle mine.yaml
   uam faults --matrix processes --engine ros --clock realtime --repeat 3
   uam faults --matrix cables --engine rehearsal --config my_lab.yaml
+  uam faults --matrix random --draws 100 --seed 3      100 random flights: one fault, or two
   uam faults --out matrix                    stop with Ctrl-C; the same command continues
   uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
 
@@ -78,6 +80,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.seed("of all noise")
     command.workers(with_ros=True)
     command.option("--repeat", "N", "flights per fault and moment", 1, type=count)
+    command.option(
+        "--draws", "N", "fly N random flights of the matrix: one fault, or two", type=count
+    )
     command.out()
 
 
@@ -109,19 +114,20 @@ def run(options: argparse.Namespace) -> int:
         vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
     file = configuration.named("campaign", options.matrix)
     given = (options.engine, options.only, options.moment, options.scenario)
-    matrix = fault_matrix.read(file, *given, vehicle)
+    matrix = fault_matrix.read(file, *given, vehicle, options.draws or 0)
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
     prepared = _rehearsals if rehearsed else _flights
     kind, make, measure, further = prepared(options, matrix, vehicle)
     out = make_folder(options.out, kind)
+    told = replace(matrix, draws=bool(matrix.draws))  # more draws are a longer table
     settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
     flown = RowTable(
         out / "flights.parquet",
         fault_rows.SCHEMA,
         inputs(
-            vehicle, matrix.scenario, settings | {"matrix": matrix, "profile and effects": further}
+            vehicle, matrix.scenario, settings | {"matrix": told, "profile and effects": further}
         ),
     )
     trials = dict(enumerate(make(cell, out) for cell in cells))
@@ -133,10 +139,25 @@ def run(options: argparse.Namespace) -> int:
 
         rows = fly_missing(flown, trials, place, fault_rows.to_row, measure, show)
     results = [fault_rows.from_row(row) for row in rows.values()]
-    summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line())
+    again = _again(options, matrix)
+    summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line(), again)
     say(summary)
     say(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0
+
+
+def _again(options: argparse.Namespace, matrix: Matrix) -> str:
+    """Return the command that repeats a flight, without its faults."""
+    named = {
+        "engine": options.engine,
+        "scenario": matrix.scenario,
+        "seed": options.seed,
+        "vehicle": options.vehicle,
+        "profile": options.profile,
+        "plant-preset": options.plant_preset,
+    }
+    chosen = [f"--{name} {value}" for name, value in named.items() if value is not None]
+    return " ".join(["uam fly", *chosen, *(f"--effect {one}" for one in options.effects or ())])
 
 
 class _Prepared(NamedTuple):

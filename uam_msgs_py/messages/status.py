@@ -116,8 +116,8 @@ class AutopilotState(_Status):
     the last second; loop_delay [s]: from a body-rate setpoint to the gyro's response; None if
     unknown. released_to: who has control in place of the companion, "" if
     nobody has. landed: by the autopilot's land detector. lands: its mode lands the
-    vehicle by itself. failed: why the bridge flies no more, "" while it may. stopped: a kill has
-    ended the flight for good.
+    vehicle by itself, or it is silent and may do so. failed: why the bridge flies no more, "" while
+    it may. stopped: a kill has ended the flight for good.
     """
 
     connected: bool = False

@@ -91,8 +91,12 @@ class JoinedAutopilot(FlightState):
         return max(LINK_GAP, self.autopilot.parameters["COM_OF_LOSS_T"])
 
     def connected(self, time: float) -> bool:
-        """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""
+        """Whether the last message is younger than DISCONNECTED at `time` [s]."""
         return time - self._received_at < DISCONNECTED
+
+    def silent(self, time: float) -> bool:
+        """See `AutopilotPort`."""
+        return self.loss_time < time - self._received_at < math.inf
 
     def poll(self, time: float) -> None:
         """Deliver delayed messages; receive the autopilot's messages since the last call.
@@ -120,6 +124,7 @@ class JoinedAutopilot(FlightState):
             self._incoming.append((time + late, _Received(answers, texts, status, landed)))
 
     def _handle(self, time: float, received: _Received) -> None:
+        self._received_at = time
         for request, result in received.answers:
             self.sequence.answer(request, result)
         for severity, text in received.texts:
@@ -128,7 +133,6 @@ class JoinedAutopilot(FlightState):
             self.landed = received.landed
         status = received.status
         if status is not None:
-            self._received_at = time
             self.take_heartbeat(time, status.mode, status.armed)
             self.intended, self.failsafe = status.intended, status.failsafe
             self.killed = status.killed

@@ -66,6 +66,19 @@ class TimedFault:
             return {"at": self.phase, "after": self.at}
         return {"at": START if self.at == FROM_START else self.at}
 
+    @property
+    def text(self) -> str:
+        """Return the fault as an option text, without parameters that have their defaults."""
+        usual = type(self.fault)()
+        times = [str(value) for value in self.moment.values()]
+        times += [] if math.isinf(self.duration) else [str(self.duration)]
+        given = [
+            f"{name}={value}"
+            for name, value in self.fault.values.items()
+            if value != getattr(usual, name)
+        ]
+        return f"{self.fault.NAME}@{'+'.join(times)}" + (":" + ",".join(given) if given else "")
+
 
 @dataclass(frozen=True)
 class Schedule:

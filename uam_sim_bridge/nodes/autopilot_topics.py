@@ -53,7 +53,7 @@ class AutopilotTopics:
             report.round_trip,
             report.released_to,
             report.landed,
-            report.mode.lands,
+            report.lands,
             report.loop_delay,
             report.failed,
             report.stopped,

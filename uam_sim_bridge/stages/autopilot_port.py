@@ -34,6 +34,13 @@ class AutopilotPort(Protocol):
         """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""
         ...
 
+    def silent(self, time: float) -> bool:
+        """Whether nothing has come from it for `loss_time` at `time` [s], after a first message.
+
+        If the link is cut in both directions, its failsafe has begun.
+        """
+        ...
+
     @property
     def loss_time(self) -> float:
         """For how long [s] the autopilot stays in OFFBOARD without setpoints: COM_OF_LOSS_T."""

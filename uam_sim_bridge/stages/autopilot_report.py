@@ -20,7 +20,8 @@ class AutopilotReport(NamedTuple):
 
     reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
     companion, "" if nobody has; landed: by the autopilot's land detector; failed: why the bridge
-    flies no more, "" while it may; stopped: a kill has ended the flight; armed_since [ns]: first
+    flies no more, "" while it may; stopped: a kill has ended the flight; lands: the autopilot's
+    mode lands by itself, or it is silent, and may do so; armed_since [ns]: first
     tick with an armed autopilot, None while disarmed; round_trip, loop_delay [s]: None if unknown.
     """
 
@@ -33,13 +34,14 @@ class AutopilotReport(NamedTuple):
     landed: bool = False
     failed: str = ""
     stopped: bool = False
+    lands: bool = False
     armed_since: int | None = None
     round_trip: float | None = None
     loop_delay: float | None = None
 
     def differs(self, other: AutopilotReport | None) -> bool:
         """Whether a field other than `armed_since` and the delays differs from `other`."""
-        return other is None or self[:9] != other[:9]
+        return other is None or self[:10] != other[:10]
 
 
 class AutopilotReports:
@@ -83,4 +85,5 @@ class AutopilotReports:
             autopilot.landed,
             sequence.failure or (KILL_SWITCH if autopilot.killed else ""),
             sequence.stopped,
+            autopilot.mode.lands or autopilot.silent(stamp / SECOND),
         )

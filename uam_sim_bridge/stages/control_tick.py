@@ -251,7 +251,7 @@ def send_setpoint(tick: ControlTick) -> bool:
 def take_report(tick: ControlTick, report: AutopilotReport) -> None:
     """Give the bridge's report of the present tick to mission and attitude law."""
     stamp = tick.signals.stamp
-    held = report.released_to, report.landed, report.mode.lands, report.failed, report.stopped
+    held = report.released_to, report.landed, report.lands, report.failed, report.stopped
     authority = Authority(*held)
     tick.mission.autopilot(
         stamp,

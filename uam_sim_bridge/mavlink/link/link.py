@@ -102,6 +102,7 @@ class OffboardLink(FlightState):
         self._texts = TextAssembler()
         self._pending: dict[int, Request] = {}
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
+        self._heard = -math.inf  # [s] newest message
         self._was_connected = False  # at the last tick
         self._told_unsigned = False
 
@@ -173,6 +174,10 @@ class OffboardLink(FlightState):
         """Return whether a heartbeat arrived in the last DISCONNECTED before `time` [s]."""
         return time - self._heartbeat_in < DISCONNECTED
 
+    def silent(self, time: float) -> bool:
+        """See `AutopilotPort`."""
+        return self.loss_time < time - self._heard < math.inf
+
     @property
     def alive(self) -> bool:
         """Whether the autopilot was connected at the last `maintain`."""
@@ -188,6 +193,7 @@ class OffboardLink(FlightState):
                 else:
                     self.statistics.count(message.get_srcComponent(), message.get_seq())
                     self.streams.count(message.get_msgId(), time)
+                    self._heard = time
                     self._handle(time, message)
         self.statistics.tick(time)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.ages import DISCONNECTED, FORWARDED, UNAIDED, age_by, usable
+from uam_control.ages import FORWARDED, UNAIDED, age_by, usable
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.stamps import SECOND
 from uam_lab.flight.direct.steady.estimation import keep_pose, same
@@ -228,9 +228,8 @@ def send(
     something to decide. time [s]: of the autopilot's cycle."""
     m = a.memory[0]
     now = stamp / SECOND
-    received_at = now if m.heartbeat else m.received_at
-    connected = now - received_at < DISCONNECTED
-    if not connected or now - min(m.streamed, m.delivered) > LINK_GAP:
+    received_at = now if m.heartbeat or m.landed else m.received_at
+    if now - received_at > LINK_GAP or now - min(m.streamed, m.delivered) > LINK_GAP:
         return False
     thrust = rate_thrust_of_state(tau_p, tau_q, state, a.flat, a.rates)
     rates = a.rates
