@@ -18,7 +18,7 @@ from uam_control.mission import (
 )
 from uam_control.mission.feasibility import in_words
 from uam_control.mission.scenarios.scenario_options import SLOWEST
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.supervision import Readings
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.arm_model import ArmModel
@@ -121,6 +121,73 @@ def test_a_steady_circle_turns_the_thrust_about_the_vertical():
     np.testing.assert_allclose(np.hypot(inner[:, 0], inner[:, 1]), w * math.sin(tilt), rtol=1e-3)
 
 
+def test_the_change_of_the_body_rates_is_that_of_an_angle_to_and_fro():
+    # pitch by a = g tan(A sin wt), straight ahead without drag: its rate changes by A w^2 sin wt,
+    # over 0.04 s less by sin(0.02 w) / (0.02 w)
+    size, w = 0.3, 5.0
+
+    def ahead(t):
+        angle = size * math.sin(w * t)
+        return rows(x=(0.0, 0.0, 9.81 * math.tan(angle)))
+
+    air = PROFILE.vehicle.numbers | {"air": {"drag": [0] * 3}}
+    still = Feasibility(replace(PROFILE.vehicle, numbers=air), OPEN, 0.0)
+    turn = still.along(Motion(ahead), TIMES, np.zeros(len(TIMES))).turn
+    expected = size * w**2 * np.abs(np.sin(w * TIMES)) * math.sin(0.02 * w) / (0.02 * w)
+    np.testing.assert_allclose(turn[5:-5], expected[5:-5], rtol=2e-3, atol=1e-2)
+
+
+def zigzag(folder, period):
+    """Back and forth along x with 45 degrees of tilt, `period` [s] one way."""
+    way = 0.79 / 0.7943 * 1.3124 * period**2  # minimum snap: 7.513 way / period^2 = g tan(tilt)
+    moves = [f"{{coordinate: x, from: 4, until: 7, to: {-way / 2:.4f}}}"]
+    for i in range(6):
+        begin, to = 7.5 + i * period, (-way / 2, way / 2)[(i + 1) % 2]
+        moves.append(
+            f"{{coordinate: x, from: {begin:.3f}, until: {begin + period:.3f}, to: {to:.4f}}}"
+        )
+    end = 7.5 + 6 * period
+    moves.append(f"{{coordinate: x, from: {end + 0.5}, until: {end + 4}, to: 0}}")
+    up = "{coordinate: z, from: 0, until: 3, to: 2}"
+    rest = f"landing: {{at: {end + 4}, duration: 4}}"
+    return scenario_of(folder, f"moves: [{', '.join([up, *moves])}]\n{rest}")
+
+
+@pytest.mark.parametrize(
+    ("period", "delay"),
+    # flown with every delay: 1.6 s lost at 30 ms, 2 s at 30 ms, 2.3 s at 40 ms; 2.5 s flown at 40
+    [(1.6, -0.01), (2.0, 0.0125), (2.3, 0.028), (2.5, 0.04)],
+)
+def test_the_faster_a_zigzag_the_less_delay_it_stands(tmp_path, period, delay):
+    limits = PROFILE.sets["mission"]
+    excesses, stands = Feasibility(PROFILE.vehicle, limits, 0.0).examined(zigzag(tmp_path, period))
+    assert stands == pytest.approx(delay, abs=0.004)
+    assert ("change of the body rate" in in_words(excesses)) is (delay < 0.0)
+    limits = replace(limits, reference_delay=stands + 0.001)
+    with pytest.raises(InfeasibleReference, match="change of the body rate"):
+        Feasibility(PROFILE.vehicle, limits, 0.0).check(zigzag(tmp_path, period))
+
+
+def test_a_delay_that_the_reference_does_not_stand_is_in_the_pre_arm_report(tmp_path):
+    mission = Mission(zigzag(tmp_path, 2.0), PROFILE.sets["mission"], vehicle=PROFILE.vehicle)
+    state = np.zeros((3, 8))
+    state[0, 2], state[0, 6:] = 0.285, mission.scenario.arm_start
+    fresh = {"mocap_age": 0.0, "joint_age": 0.0, "controller_age": 0.0, "autopilot_age": 0.0}
+    mission.step(0.0, state, None, Readings(**fresh, round_trip=0.004))
+    assert mission.start() == (True, "arming")
+    mission = Mission(zigzag(tmp_path, 2.0), PROFILE.sets["mission"], vehicle=PROFILE.vehicle)
+    mission.step(0.0, state, None, Readings(**fresh, round_trip=0.028))
+    accepted, why = mission.start()
+    assert not accepted and "delay for the reference: 0.028 s (at most 0.01" in why
+
+
+@pytest.mark.parametrize("name", ["race_5", "race_5_payload", "race_10", "race_10_payload"])
+def test_the_races_stand_every_delay_that_a_flight_is_allowed(name):
+    limits = load_profile("s500", "race_10").sets["mission"]
+    excesses, stands = Feasibility(PROFILE.vehicle, limits, 0.2).examined(load_scenario(name))
+    assert not excesses and stands > limits.setpoint_delay_land
+
+
 def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     still = Motion(lambda t: rows(alpha_1=(math.pi / 2, 0, 0)))  # both links horizontal, forward
     demand = checked().along(still, TIMES, np.full(len(TIMES), 0.2))
@@ -175,6 +242,12 @@ def test_the_refusal_says_what_exceeds_which_limit_and_when():
         ({"tilt_hold": 0.3}, "tilt 0.387 rad exceeds 0.3 rad at"),
         ({"reference_tilt": 0.3}, "tilt 0.387 rad exceeds 0.3 rad at"),
         ({"reference_thrust": 22.0}, "thrust 23.8 N exceeds 22 N at"),
+        ({"reference_body_rate": 0.5}, r"body rate 0.8\d* rad/s exceeds 0.5 rad/s at"),
+        ({"reference_turn": 2.0}, r"change of the body rate 2.\d+ rad/s\^2 exceeds 2 rad/s\^2 at"),
+        (
+            {"reference_turn": 4.0, "reference_delay": 0.04},
+            r"change of the body rate 2.\d+ rad/s\^2 exceeds 2 rad/s\^2 at",
+        ),
         ({"body_rate_hold": 0.5}, r"body rate 0.8\d* rad/s exceeds 0.5 rad/s at"),
         ({"geofence_high": (0.5, 5.0, 6.0)}, "^x 1 m exceeds 0.5 m at"),
         ({"geofence_low": (-5.0, -0.5, -1.0)}, "^y -1 m is below -0.5 m at"),
@@ -296,6 +369,26 @@ def test_limits_of_the_reference_follow_from_the_position_controller(tmp_path):
     assert (limits.reference_tilt, limits.reference_thrust) == (0.5, 39.0)
 
 
+def test_limits_of_the_body_rates_follow_from_bridge_and_attitude_controller(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "mavlink_bridge:\n  ros__parameters: {rate_limit: [4.0, 5.0, 2.0]}\n"
+        "attitude_controller:\n  ros__parameters: {torque_max: [0.66, 1.32, 0.3]}\n"
+    )
+    limits = load_profile("s500", str(file)).sets["mission"]
+    assert limits.reference_body_rate == pytest.approx(3.6)
+    assert limits.reference_yaw_rate == pytest.approx(1.8)
+    assert limits.reference_turn == pytest.approx(15.0)  # 0.75 * 0.66 / 0.033
+
+
+@pytest.mark.parametrize("given", ["[1.0, 2.0]", "3.0", "fast"])
+def test_a_rate_limit_that_is_no_list_of_three_is_refused_in_one_line(tmp_path, given):
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"mavlink_bridge:\n  ros__parameters: {{rate_limit: {given}}}\n")
+    with pytest.raises(ProfileError, match="mission: rate_limit: "):
+        load_profile("s500", str(file))
+
+
 def test_a_flight_is_refused_before_it_starts_or_slowed_down():
     with pytest.raises(InfeasibleReference, match="scenario ellipse: .*thrust 42.3 N"):
         flight_settings("ellipse", engine="direct")
@@ -386,7 +479,8 @@ def test_moves_begin_near_their_place(name, place, yaw, complaint):
     state = np.zeros((3, 8))
     state[0, :3], state[0, 5], state[0, 6:] = (*place, 0.285), yaw, mission.scenario.arm_start
     mission.step(0.0, state, None, fresh)
-    assert mission.not_ready.startswith(f"place: {complaint}" if complaint else "")
+    assert mission.not_ready.startswith("place: ") is bool(complaint)
+    assert complaint in mission.not_ready
     assert bool(mission.not_ready) is bool(complaint)
     state[0, :3], state[0, 5] = (0.1, -0.1, 0.285), 0.1  # carried back
     mission.step(1.0, state, None, fresh)

@@ -12,6 +12,7 @@ from uam_control.supervision import Observation, Readings, SupervisionParameters
 from uam_control.supervision.checks import (
     CHECKS,
     LATE,
+    LATE_FOR_REFERENCE,
     LATE_LOOP,
     Checks,
     measure,
@@ -108,13 +109,13 @@ def test_readings_have_their_places():
     np.testing.assert_array_equal(values[:9], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
-        values[9:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 20]
+        values[9:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 77, 20]
     )
 
 
 def test_what_is_unknown_is_below_every_limit():
     values = np.zeros(len(CHECKS))
-    values[[LATE, LATE_LOOP]] = -math.inf  # by `Checks.update`
+    values[[LATE, LATE_LOOP, LATE_FOR_REFERENCE]] = -math.inf  # by `Checks.update`
     nothing = Readings()
     read(
         *(readings_of(nothing), nothing.joint_effort, nothing.gains),
@@ -261,6 +262,24 @@ def test_a_measured_delay_needs_evidence_without_a_gap(beyond, level):
     )[::2] == (level, "setpoint delay")
 
 
+@pytest.mark.parametrize("late", [{"loop_delay": 0.051}, {"round_trip": 0.102}])
+def test_a_delay_that_the_reference_does_not_stand_holds(late):
+    checks = Checks(AT_ONCE)
+    assert checks.update(0.0, seen(**late), True) is None  # of any reference 62.5 ms are allowed
+    checks.follow(0.05)
+    cause = "setpoint delay 0.051 s exceeds 0.05 s that the reference stands"
+    assert checks.update(0.0, seen(**late), True) == (HOLD, cause, "delay for the reference")
+
+
+def test_before_the_start_the_whole_round_trip_counts_for_the_reference():
+    checks = Checks(AT_ONCE)
+    assert "delay for the reference" not in {check.name for check, _, _ in checks.on_ground()}
+    checks.follow(0.05)
+    checks.update(0.0, seen(round_trip=0.06), False)
+    (found,) = [row[1:] for row in checks.on_ground() if row[0].name == "delay for the reference"]
+    assert found == (0.06, 0.05)
+
+
 def test_a_measured_delay_counts_in_flight_only():
     assert Checks(AT_ONCE).update(0.0, seen(loop_delay=1.0), False) is None
 
@@ -344,4 +363,4 @@ def test_other_limits_are_those_of_the_next_tick():
 
 
 def test_every_quantity_is_named_once():
-    assert len({check.name for check in CHECKS}) == len(CHECKS) == 23
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 24

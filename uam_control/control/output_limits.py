@@ -30,6 +30,15 @@ LONGEST_PREDICTION = 0.1  # [s]
 
 
 @dataclass(frozen=True)
+class RateLimits(ParameterSet):
+    """Limit of the bridge's setpoints."""
+
+    rate_limit: tuple = vector(
+        (6.0, 6.0, 3.0), "largest body-rate setpoint about roll, pitch, yaw", "rad/s", 0.05, 50.0, 3
+    )
+
+
+@dataclass(frozen=True)
 class PositionLimits(ParameterSet):
     """Weight, limits of tau_p and filter of the desired attitude."""
 

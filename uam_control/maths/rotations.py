@@ -174,7 +174,10 @@ def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
 
 def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
     """Return `angle` [rad] (number or array of any shape) wrapped to [-pi, pi)."""
-    return (np.asarray(angle) + math.pi) % (2.0 * math.pi) - math.pi
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+wrapped = jit(wrap_angle)  # the same for compiled functions
 
 
 @jit

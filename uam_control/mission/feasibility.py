@@ -13,7 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
+from uam_control.coordinates import (
+    ALPHA,
+    ARM,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    POSITION,
+    ROLL,
+    YAW,
+    X,
+    Y,
+    Z,
+)
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
@@ -36,6 +48,7 @@ THRUST = "thrust"
 ROUNDING = 1e-6  # [SI]
 DRAGGED = "height while it moves across"
 ACROSS = ("x", "y", "yaw")
+TURN = 2  # steps to both sides, over which a change of the body rates counts: the rate loop's lag
 PRECISION = 1e-3  # of the slowdown, relative
 ROOM = 1.002  # by which the slowdown is larger than the least one found
 
@@ -79,7 +92,8 @@ class Demand(NamedTuple):
     """What a reference needs at times (m,) [s] of mission time.
 
     position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; yaw_rate (m,) [rad/s]; angles (m, n) [rad]; joint_rates (m, n) [rad/s];
+    [rad/s, FLU]; turn (m,) [rad/s^2]: change of those of roll and pitch; yaw_rate (m,) [rad/s];
+    angles (m, n) [rad]; joint_rates (m, n) [rad/s];
     joint_torques (m, n) [N m] and magnet_force (m,) [N], the payload's apparent weight, NaN if the
     arm's masses are unknown.
     """
@@ -90,6 +104,7 @@ class Demand(NamedTuple):
     thrust: np.ndarray
     tilt: np.ndarray
     body_rates: np.ndarray
+    turn: np.ndarray
     yaw_rate: np.ndarray
     angles: np.ndarray
     joint_rates: np.ndarray
@@ -125,17 +140,22 @@ class Feasibility:
 
     def excesses(self, scenario: Scenario) -> list[Excess]:
         """Return every limit that the scenario exceeds on a flight from the origin, the earliest
-        first.
+        first."""
+        return self.examined(scenario)[0]
+
+    def examined(self, scenario: Scenario) -> tuple[list[Excess], float]:
+        """Return the `excesses`, and the delay of the setpoints [s] that the reference stands.
 
         A flight of many hours is computed in parts, so that its memory is bounded.
         """
-        flight = _Planned(scenario)
+        flight, turn = _Planned(scenario), 0.0
         found: dict[tuple[str, float], Excess] = {}
         legs: dict[str, dict[tuple[str, float], Excess]] = {RUN_UP: {}, TRAJECTORY: {}, RUN_OUT: {}}
         for begin in range(0, len(flight.times), PART):
             part = slice(max(begin - BESIDE, 0), begin + PART + BESIDE)
             demand = self._planned(flight, part)
             demand = demand.within(slice(begin - part.start, begin - part.start + PART))
+            turn = max(turn, float(demand.turn.max()))
             if not self._collect(demand, flight.ground, found):
                 continue
             phases = np.array([flight.scenario.phase(time) for time in demand.times])
@@ -146,7 +166,7 @@ class Feasibility:
             for key in legs[leg].keys() - legs[TRAJECTORY].keys():
                 named = legs[leg][key]._replace(ramp=leg)
                 found[key] = max(named, found[key], key=_beyond) if found[key].ramp else named
-        return sorted(found.values(), key=lambda excess: excess.first)
+        return sorted(found.values(), key=lambda excess: excess.first), self.limits.delay_of(turn)
 
     def _collect(self, demand: Demand, ground: float, found: dict) -> bool:
         """Add what a demand exceeds to `found`, the worst of each limit; return whether it does."""
@@ -186,11 +206,12 @@ class Feasibility:
         ground = demand.position[0, Z] if ground is None else ground
         low, high = np.array(p.geofence_low), np.array(p.geofence_high)
         high[Z] = min(high[Z], ground + p.altitude_hold)
-        rates = np.abs(demand.body_rates).max(axis=1)
+        rates = np.abs(demand.body_rates[:, : YAW - ROLL]).max(axis=1)
         upper = [
             (THRUST, demand.thrust, self.thrust_limit, "N"),
             ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
-            ("body rate", rates, p.body_rate_hold, "rad/s"),
+            ("body rate", rates, min(p.reference_body_rate, p.body_rate_hold), "rad/s"),
+            ("change of the body rate", demand.turn, p.largest_turn, "rad/s^2"),
             ("yaw rate", np.abs(demand.yaw_rate), p.reference_yaw_rate, "rad/s"),
         ]
         for i in range(demand.angles.shape[1]):
@@ -316,6 +337,7 @@ class Feasibility:
             thrust,
             np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
             rates,
+            _changes(rates[:, : YAW - ROLL]),
             turning[:, 2],
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
@@ -340,6 +362,14 @@ class Feasibility:
 def in_words(excesses: list[Excess]) -> str:
     """Return the excesses in one line."""
     return "; ".join(excess.text for excess in excesses)
+
+
+def _changes(rates: np.ndarray) -> np.ndarray:
+    """Return the larger change (m,) [rad/s^2] of rates (m, 2) [rad/s] STEP apart."""
+    found = np.zeros(len(rates))
+    apart = np.abs(rates[2 * TURN :] - rates[: -2 * TURN]).max(axis=1)
+    found[TURN : TURN + len(apart)] = apart / (2 * TURN * STEP)
+    return found
 
 
 @jit

@@ -105,7 +105,12 @@ class Mission:
         self._ground_pose = GroundPose()
         self._followed: Decision | None = None  # the newest decision whose values are in the output
         self._in_flight: Observation | None = None  # of every tick after the take-off
-        self._pre_arm.check_reference(parameters)
+        self._check_reference()
+
+    def _check_reference(self) -> None:
+        """Compare the reference with the limits, and hold beyond the delay that it stands."""
+        self._pre_arm.check_reference(self._parameters)
+        self._supervisor.checks.follow(self._pre_arm.stands)
 
     def _use(self, scenario: Scenario) -> None:
         """Fly `scenario`."""
@@ -161,7 +166,7 @@ class Mission:
         self._parameters = parameters
         self._supervisor.configure(parameters)
         if self._guidance is None or self.output.done:
-            self._pre_arm.check_reference(parameters)
+            self._check_reference()
         else:
             self._guidance.configure(parameters)
         if self._watch is not None:

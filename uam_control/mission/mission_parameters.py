@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from uam_control.grasp import GraspParameters
@@ -67,14 +68,48 @@ class BrakeLimits(ParameterSet):
 @dataclass(frozen=True)
 class FeasibilityLimits(ParameterSet):
     """Limits of the reference before take-off, in addition to the supervisor's. Without a value
-    in the profile they are the position controller's thrust_max and tilt_max, and 90 % of the
-    bridge's rate_limit about z: the law needs the rest."""
+    in the profile they are the position controller's thrust_max and tilt_max, 90 % of the bridge's
+    rate_limit, and 75 % of the attitude controller's torque_max / inertia: the law needs the rest.
+    """
 
     reference_thrust: float = number(36.0, "largest force that a reference needs", "N", 0.1, 1e3)
     reference_tilt: float = number(0.35, "largest tilt that a reference needs", "rad", 0.01, 1.5)
+    reference_body_rate: float = number(
+        5.4, "largest body rate of roll and pitch that a reference needs", "rad/s", 0.01, 50.0
+    )
     reference_yaw_rate: float = number(
         2.7, "largest yaw rate that a reference needs", "rad/s", 0.01, 50.0
     )
+    reference_turn: float = number(
+        34.0,
+        "largest change of the body rates of roll and pitch that a reference needs, with "
+        "setpoints in time",
+        "rad/s^2",
+        0.1,
+        1e4,
+    )
+    reference_delay: float = number(
+        0.0, "delay of the setpoints with which references are checked", "s", 0.0, 1.0
+    )
+    rate_lag: float = number(
+        0.04, "lag of the body rates behind their setpoint, of the autopilot's rate loop; a delay "
+        "as long halves the change of the body rates that the law can make", "s", 0.001, 1.0,
+    )  # fmt: skip
+
+    @property
+    def largest_turn(self) -> float:
+        """Return the largest change of the body rates [rad/s^2] with `reference_delay`.
+
+        At a change a the law sees body rates that are older by the delay, so a (rate_lag + delay)
+        below the rates that follow. Of the torque that it may ask for, this is delay / rate_lag
+        of the part that accelerates.
+        """
+        return self.reference_turn / (1.0 + self.reference_delay / self.rate_lag)
+
+    def delay_of(self, turn: float) -> float:
+        """Return the delay of the setpoints [s] at which a reference with this largest change of
+        the body rates [rad/s^2] is at its limit; inf for 0."""
+        return self.rate_lag * (self.reference_turn / turn - 1.0) if turn else math.inf
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, CHI, POSITION, YAW
@@ -17,7 +19,10 @@ MOVED = 0.02  # [m, rad] from which on a vehicle on the ground stands in another
 
 
 class PreArm:
-    """The report of one scenario; `permission`: of the checklist."""
+    """The report of one scenario.
+
+    `permission`: of the checklist; `stands` [s]: delay of the setpoints that the reference stands.
+    """
 
     def __init__(
         self,
@@ -35,18 +40,20 @@ class PreArm:
         self._place: tuple[PreflightCheck, ...] = ()
         self._reference: tuple[PreflightCheck, ...] = ()
         self._checked: MissionParameters | None = None  # with which the reference was compared
+        self.stands = math.inf
 
     def check_reference(self, parameters: MissionParameters) -> None:
         """Compare the whole reference with the limits; the time grows with the flight's length."""
         if self._vehicle is None or parameters == self._checked:
             return
         self._checked, self._stands = parameters, None
-        if self._compared:
-            return
         check = Feasibility(self._vehicle, parameters, self._scenario.payload_mass)
-        found = in_words(check.excesses(self._scenario))
-        line = PreflightCheck("reference", found or "within", "within all limits", not found)
-        self._reference = (line,)
+        excesses, stands = check.examined(self._scenario)
+        # setpoints are never earlier than nominal, which every profile stands
+        self.stands, found = max(stands, parameters.delay_nominal), in_words(excesses)
+        if not self._compared:
+            line = PreflightCheck("reference", found or "within", "within all limits", not found)
+            self._reference = (line,)
 
     def report(
         self, stamp: float, checks: Checks, seen: Observation, parameters: MissionParameters

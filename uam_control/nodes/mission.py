@@ -9,7 +9,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Bool
 
-from uam_control.control.output_limits import PositionLimits
 from uam_control.coordinates import ARM, ATTITUDE, CHI
 from uam_control.grasp import Grasp
 from uam_control.laws.catalogue import DEFAULT
@@ -28,7 +27,13 @@ from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
-from uam_control.profiles.profile import BRIDGE, Profile, default_profile, reference_limits
+from uam_control.profiles.profile import (
+    BRIDGE,
+    CONTROLLERS,
+    Profile,
+    default_profile,
+    reference_limits,
+)
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
@@ -58,7 +63,7 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, ENCODE, STAGE
 
 NAME = "mission"
-POSITION_CONTROLLER = "position_controller"
+AXES = 3  # of position and attitude
 STATUS_PERIOD = 500_000_000  # [ns]
 PATH_STEP = 0.25  # [s] between two poses of the path
 PATH_LENGTH = 250.0  # [s] of the flight in it: a tick must not wait for the path of hours
@@ -139,11 +144,13 @@ class MissionNode(UamNode):
 
     def _reference_limits(self, profile: Profile) -> dict[str, float]:
         """Return those by position controller and bridge: of the parameter file, or `profile`."""
-        default = profile.sets[POSITION_CONTROLLER]
-        given = neighbour_section(self, POSITION_CONTROLLER)
-        limits = {name: given[name] for name in PositionLimits.specs() if name in given}
+        bases = []
+        for controller, (limits, _) in list(CONTROLLERS.items())[:2]:
+            given = neighbour_section(self, controller)
+            known = {name: given[name] for name in (*limits.specs(), "inertia") if name in given}
+            bases.append(replace(profile.sets[controller], **known).validated(AXES))
         bridge = neighbour_section(self, BRIDGE) or profile.section(BRIDGE)
-        return reference_limits(replace(default, **limits), bridge)
+        return reference_limits(*bases, bridge)
 
     def _scenario(self, vehicle: VehicleDescription) -> Scenario:
         """Return the scenario; with the parameter `retime` slowed down until it is feasible."""

@@ -17,12 +17,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from uam_control.control.output_limits import (
     ArmLimits,
     AttitudeLimits,
     PositionLimits,
+    RateLimits,
 )
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ARM, ATTITUDE, POSITION, ROLL, YAW
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
@@ -42,7 +45,9 @@ CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
-FOLLOWED = 0.9  # share of the bridge's largest yaw rate that a reference may need
+# shares that a reference may need: of the bridge's largest body rates; of the acceleration that the
+# attitude law's largest torque gives
+FOLLOWED, TURNED = 0.9, 0.75
 # of the process of every node
 PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
@@ -222,18 +227,24 @@ def _file(name_or_file: str) -> Path:
         raise ProfileError(str(error)) from None
 
 
-def reference_limits(position: PositionLimits, bridge: Mapping[str, Any]) -> dict[str, float]:
+def reference_limits(
+    position: PositionLimits, attitude: AttitudeLimits, bridge: Mapping[str, Any]
+) -> dict[str, float]:
     """Return the limits of the mission's reference that follow from other nodes' limits.
 
-    bridge: its raw parameters; without `rate_limit` that of config/bridge counts.
+    bridge: its raw parameters. Raises ParameterError for a `rate_limit` that is not valid.
     """
-    usual = read_sections(configuration.path("bridge/bridge.yaml"))[BRIDGE]
-    largest = bridge.get("rate_limit", usual["rate_limit"])[2]
-    return {
+    roll, pitch, yaw = RateLimits.among(bridge).rate_limit
+    limits = {
         "reference_thrust": position.thrust_max,
         "reference_tilt": position.tilt_max,
-        "reference_yaw_rate": FOLLOWED * largest,
+        "reference_body_rate": FOLLOWED * min(roll, pitch),
+        "reference_yaw_rate": FOLLOWED * yaw,
     }
+    if inertia := getattr(attitude, "inertia", ()):  # laws of users may have none
+        turns = np.divide(attitude.torque_max, inertia)[: YAW - ROLL]
+        limits["reference_turn"] = TURNED * float(turns.min())
+    return limits
 
 
 def profile_of(
@@ -249,10 +260,10 @@ def profile_of(
         aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         values = derived.get(node, {}) | values
-        if node == "mission":
-            bridge = sections.get(BRIDGE, {})
-            values = reference_limits(sets["position_controller"], bridge) | values
         try:
+            if node == "mission":
+                bases = sets["position_controller"], sets["attitude_controller"]
+                values = reference_limits(*bases, sections.get(BRIDGE, {})) | values
             kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))
         except MissingParameter as error:

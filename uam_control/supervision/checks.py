@@ -15,7 +15,7 @@ import numpy as np
 from uam_control.ages import FORWARDED, usable
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.maths.compiled import jit, prepared
-from uam_control.maths.rotations import tilt
+from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
@@ -23,6 +23,8 @@ from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop delay"
+REFERENCE_DELAY = "delay for the reference"
+DELAYS = (SETPOINT_DELAY, REFERENCE_DELAY)  # of the link, known before the take-off
 POSES_OFF = "motion capture"
 
 
@@ -103,12 +105,14 @@ CHECKS = (
     Check("motion capture and IMU", "{name} contradict each other by {value:.1f} m/s^2, {limit:g} "
           "m/s^2 allowed", failsafe="contradiction_failsafe", in_flight=True,
           reading="contradiction"),
+    Check(REFERENCE_DELAY, "setpoint delay {value:.3f} s exceeds {limit:.3g} s that the reference "
+          "stands", REFERENCE_DELAY),
     Check("simulation", "the {name} runs {value:.0%} slower than the wall clock, {limit:.0%} "
           "allowed; the autopilot has its own clock", "slower_hold", reading="slower"),
 )  # fmt: skip
-LATE, LATE_LOOP, EFFORT, GAIN = (
+LATE, LATE_LOOP, LATE_FOR_REFERENCE, EFFORT, GAIN = (
     [check.name for check in CHECKS].index(it)
-    for it in (SETPOINT_DELAY, LOOP_DELAY, "joint torque", "adapted gain")
+    for it in (SETPOINT_DELAY, LOOP_DELAY, REFERENCE_DELAY, "joint torque", "adapted gain")
 )
 BLIND = frozenset(check.name for check in CHECKS if check.blind)
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
@@ -147,6 +151,7 @@ class Checks:
         self._values = np.zeros(len(CHECKS))
         self.finding: ExceededLimit | None = None
         self.setpoint_delay = math.nan
+        self._stands = math.inf
         self.configure(parameters)
         rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), (0.0,) * len(_ROWS)
         self._measure = prepared(
@@ -158,7 +163,7 @@ class Checks:
         """Use `parameters` (validated) from the next tick on."""
         p = self._parameters = parameters
         self._limits = tuple(
-            tuple(_limit(p, check, limit) for limit in (check.hold, check.land, check.failsafe))
+            tuple(self._limit(check, limit) for limit in (check.hold, check.land, check.failsafe))
             for check in CHECKS
         )
         self._after = tuple(
@@ -170,6 +175,16 @@ class Checks:
         self._bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
         self._bounds = self._bounds.astype(float)
         self._joints = len(p.joint_angle_hold)
+
+    def follow(self, stands: float) -> None:
+        """Use a reference that stands a delay of the setpoints of `stands` [s], inf: any."""
+        self._stands = stands
+        self.configure(self._parameters)
+
+    def _limit(self, check: Check, limit: str | float) -> float:
+        if limit == REFERENCE_DELAY:
+            return self._stands
+        return check.sign * getattr(self._parameters, limit) if isinstance(limit, str) else limit
 
     def update(self, stamp: float, seen: Observation, in_flight: bool) -> ExceededLimit | None:
         """Check the tick at `stamp` [s]; return the worst exceeded limit, None without one.
@@ -217,14 +232,8 @@ class Checks:
         Value and limit have the sign of the check: larger is worse. An unknown value is -inf.
         """
         for check, value, limits in zip(CHECKS, self._values.tolist(), self._limits, strict=True):
-            if not check.in_flight:
+            if not check.in_flight and min(limits) < NONE:
                 yield check, value, min(limits)
-
-
-def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:
-    if isinstance(limit, str):
-        return check.sign * getattr(parameters, limit)
-    return limit
 
 
 def _cause(check: Check, value: float, limit: float) -> str:
@@ -260,6 +269,7 @@ def measure_all(
     measure(state, reference, mocap, age, ground, corners, bounds[angle:effort], values)
     read(readings, efforts, gains, bounds[effort:], bounds[gain:angle], values)
     values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
+    values[LATE_FOR_REFERENCE] = max(values[LATE], values[LATE_LOOP])
     return _below(values, bounds[:box])
 
 
@@ -299,8 +309,7 @@ def measure(
     values[4] = state[CHI, Z] - ground
     values[5] = outside
     values[6] = _largest(state[CHI, ALPHA:], joints)
-    turn = state[CHI, YAW] - reference[CHI, YAW]
-    values[8] = abs(math.atan2(math.sin(turn), math.cos(turn)))
+    values[8] = abs(wrapped(state[CHI, YAW] - reference[CHI, YAW]))
     values[7] = math.sqrt(apart) if usable(age, FORWARDED) and not math.isnan(apart) else -math.inf
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
 from uam_control.settings.plain_members import plain_members
-from uam_control.supervision.checks import POSES_OFF, SETPOINT_DELAY, Checks
+from uam_control.supervision.checks import DELAYS, POSES_OFF, Checks
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
@@ -234,7 +234,7 @@ class Supervisor:
         failed = f"bridge: {seen.authority.failed}" if seen.authority.failed else ""
         if failed and self._arm:
             yield Event.GIVEN_UP, failed
-        late = finding is not None and finding.name == SETPOINT_DELAY
+        late = finding is not None and finding.name in DELAYS
         if late and self._arm and self.state is State.GROUNDED:
             yield Event.GIVEN_UP, cause  # waiting does not make a link faster
         if seen.authority.landed:

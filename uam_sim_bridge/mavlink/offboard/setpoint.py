@@ -39,9 +39,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit, prepared
-from uam_control.settings.parameter_set import ParameterSet, number, vector
+from uam_control.settings.parameter_set import number, vector
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
 from uam_sim_bridge.mavlink.offboard.thrust_curve import (
@@ -71,7 +72,7 @@ class SetpointRefused(ValueError):
 
 
 @dataclass(frozen=True)
-class RateThrustParameters(ParameterSet):
+class RateThrustParameters(RateLimits):
     """Numbers of vehicle and autopilot that the map uses.
 
     Values that are NaN or empty by default come from the vehicle's description: `of`.
@@ -102,9 +103,6 @@ class RateThrustParameters(ParameterSet):
         0.01,
         10.0,
         3,
-    )
-    rate_limit: tuple = vector(
-        (6.0, 6.0, 3.0), "largest body-rate setpoint about roll, pitch, yaw", "rad/s", 0.05, 50.0, 3
     )
     thrust_min: float = number(1.0, "smallest collective sent in flight", "N", 0.0, 1000.0)
     thrust_max: float = number(40.0, "largest collective sent", "N", 0.1, 4000.0)
