@@ -179,7 +179,7 @@ def test_a_start_whose_evaluation_was_killed_is_evaluated_again(tmp_path, capsys
     ):
         assert main([*arguments, *changes, "--evaluations", "2"]) == 2
         complaint = capsys.readouterr().err
-        assert "evaluations of another space" in complaint and complaint.count("\n") == 1
+        assert "evaluations with other inputs (" in complaint and complaint.count("\n") == 1
 
 
 def trials(*values):

@@ -9,7 +9,6 @@ several machines can use. The storage contains every evaluation, so a stopped se
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import warnings
 from collections.abc import Callable
@@ -21,11 +20,13 @@ from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
+from uam_lab.campaign.inputs import inputs
 from uam_lab.campaign.trial import measure
 from uam_lab.flight.direct.warm_up import prepare_direct
 from uam_lab.tuning.convergence import SMALL, improvement
 from uam_lab.tuning.front import delay_margin, hypervolumes
 from uam_lab.tuning.space import Space, TuningError
+from uam_lab.workers.identity import difference
 from uam_lab.workers.place import Workplace
 from uam_lab.workers.workers import workers
 
@@ -83,14 +84,17 @@ def open_study(task: Task) -> optuna.Study:
     )
 
 
-def problem(space: Space) -> str:
-    """Return a digest of all that the costs depend on; equal on every machine."""
-    start, vehicle = space.start, space.start.vehicle
-    inputs = (
-        *(space.knobs, space.flights, space.cost, space.delay_margin),
-        *(start.sets, start.bridge(), vehicle.numbers, vehicle.autopilot_gains),
-    )
-    return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]
+def problem(space: Space) -> dict[str, str]:
+    """Return name → digest of all that the costs depend on; equal on every machine."""
+    start, found = space.start, {}
+    further = {
+        "space": (space.knobs, space.flights, space.cost, space.delay_margin),
+        "profile": (start.sets, start.bridge()),
+    }
+    for scenario in sorted({trial.scenario for trial in space.trials(start)}):
+        found |= inputs(start.vehicle, scenario, further)
+        found[f"scenario {scenario}"] = found.pop("scenario")
+    return found
 
 
 def evaluated_start(space: Space, study: optuna.Study) -> FrozenTrial | None:
@@ -105,10 +109,12 @@ def _begin(study: optuna.Study, space: Space) -> None:
     An evaluation that was killed stays RUNNING, so the start may be evaluated twice.
     """
     own = problem(space)
-    if study.user_attrs.get(PROBLEM, own) != own:
+    before = study.user_attrs.get(PROBLEM, own)
+    if before != own:
+        changed = difference(before, own) if isinstance(before, dict) else "an earlier version"
         raise TuningError(
-            f"study {study.study_name} has evaluations of another space, profile, vehicle or "
-            "plant: give another --out or --study"
+            f"study {study.study_name} has evaluations with other inputs ({changed}): undo the "
+            "change, or give another --out or --study"
         )
     study.set_user_attr(PROBLEM, own)
     waiting = study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
