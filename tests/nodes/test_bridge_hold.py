@@ -147,3 +147,16 @@ def test_without_states_it_levels_by_the_motion_capture(make_rig):
 
     begin = time.monotonic()
     rig.probe.until(rolled, "rates against the tilt that the mocap shows")
+
+
+def test_a_tick_that_waited_for_a_stopped_process_gets_no_setpoint(make_rig):
+    """It is answered, and nothing is sent; if later ones are as late, time stood still."""
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0")
+    rig.fly()
+    while rig.tick((0, 0, WEIGHT))[1] == 0.0:  # a stall of the test itself
+        pass
+    rig.received.clear()
+    time.sleep(0.4)
+    assert rig.tick((0, 0, WEIGHT))[1] == 0.0
+    assert "SET_ATTITUDE_TARGET" not in rig.kinds()
+    rig.probe.until(lambda: rig.tick((0, 0, WEIGHT))[1] > 0.0, "setpoints again")

@@ -1,4 +1,4 @@
-"""How much slower than the wall clock a simulation runs."""
+"""Stamps against the wall clock."""
 
 import math
 
@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.supervision.pace import WINDOW, Pace
+from uam_control.ages import STALE
+from uam_control.supervision.pace import WINDOW, Pace, Waited
 
 
 def run(pace, factor, seconds, stamp=0.0, wall=100.0):
@@ -45,3 +46,28 @@ def test_a_new_simulation_begins_anew():
     _, wall = run(pace, 0.5, 3.0)
     pace.tick(0.0, wall + 0.004)
     assert math.isnan(pace.slower)
+
+
+@given(st.floats(0.11, 5.0), st.lists(st.floats(0.0, 0.09), max_size=20))
+def test_ticks_that_waited_for_a_stopped_process_are_old(stopped, steps):
+    """They come in bursts, the newest of each is a tick; one that has come in time is not old."""
+    waited, wall, stamp = Waited(), 100.0, 0.0
+    for _ in range(50):
+        stamp, wall = stamp + 0.004, wall + 0.004
+        assert not waited.old(stamp, wall)
+    wall += stopped
+    for step in steps:
+        wall, stamp = wall + step, stamp + step + 0.03
+        age = wall - 100.0 - stamp
+        assert waited.old(stamp, wall) is (age > STALE) or abs(age - STALE) < 1e-6
+    assert not waited.old(max(stamp, wall - 100.0), wall)
+
+
+def test_no_tick_is_old_if_the_time_of_the_stamps_stood_still():
+    waited, wall, stamp = Waited(), 100.0, 0.0
+    found = []
+    for tick in range(100):
+        stamp, wall = stamp + 0.004, wall + (5.0 if tick == 10 else 0.004)
+        found.append(waited.old(stamp, wall))
+    assert not any(found[:10]) and sum(found) == pytest.approx(STALE / 0.004, abs=1)
+    assert not any(found[40:]) and not waited.old(0.0, wall + 0.004 - stamp)

@@ -1,4 +1,4 @@
-"""How much slower than the wall clock a simulation runs.
+"""Stamps against the wall clock: how much slower a simulation runs, and which ticks have waited.
 
 An autopilot with its own clock (hardware in the loop) cannot fly a vehicle whose time passes more
 slowly: its rate loop and its estimator integrate over the wrong time.
@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 from collections import deque
 
+from uam_control.ages import STALE
+
 WINDOW = 1.0  # [s] of the wall clock
+FALLS = 0.02  # [s] by which the lag falls while what has waited arrives
 
 
 class Pace:
@@ -31,3 +34,26 @@ class Pace:
         begun, first = seen[0]
         if wall - begun >= WINDOW:
             self.slower = 1.0 - (stamp - first) / (wall - begun)
+
+
+class Waited:
+    """Finds the ticks that have waited while a process stood still: they are old.
+
+    The lag of a tick is the wall clock's time less its stamp. A lag that is larger than before by
+    more than STALE, and falls, is that of ticks that have waited. If it stays for STALE, the time
+    of the stamps stood still, too: no tick has waited.
+    """
+
+    def __init__(self) -> None:
+        self._lag = self._late = self._since = math.inf
+
+    def old(self, stamp: float, wall: float) -> bool:
+        """Return whether the tick `stamp` [s], which begins at `wall` [s], has waited."""
+        lag = wall - stamp
+        if lag - self._lag > STALE:
+            if lag < self._late - FALLS:
+                self._late, self._since = lag, wall
+            if wall - self._since < STALE:
+                return True
+        self._lag, self._late = lag, math.inf
+        return False

@@ -26,6 +26,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
+from uam_control.supervision.pace import Waited
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -123,7 +124,8 @@ class MavlinkBridgeNode(UamNode):
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
-        self._begun = self._last_tick = time.monotonic()
+        self._last_tick = time.monotonic()
+        self._waited = Waited()
         self._warm_up()
 
         self._setpoint = self.publisher(topics.SETPOINT)
@@ -222,7 +224,7 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
         self.times.lap(DECODE)
-        self._begin_tick(stamp)
+        self._begin_tick(stamp, self._old(stamp))
         self._adopt()
         if state is BAD or position is BAD or torque is BAD:
             setpoint = self.stage.without(stamp)
@@ -245,16 +247,18 @@ class MavlinkBridgeNode(UamNode):
         self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
         self.done_tick(stamp, begun)
 
-    def _begin_tick(self, stamp: int) -> None:
+    def _old(self, stamp: int) -> bool:
+        """Return whether the tick `stamp` [ns] has waited while a process stood still."""
+        realtime = self._options.clock == "realtime"
+        return realtime and self._waited.old(stamp / SECOND, time.monotonic())
+
+    def _begin_tick(self, stamp: int, old: bool = False) -> None:
         """Begin a tick: update delay and faults of the link, receive the autopilot's messages."""
         if self._late:
             self._late.update(stamp / SECOND)
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
-        now, begun = time.monotonic(), self._begun
-        self._begun = now
-        real = self._options.clock == "realtime" and self.ticks
-        self.stage.hear(stamp, now - begun if real else 0.0)
+        self.stage.hear(stamp, old)
         if self._magnet is not None:
             self._magnet.update(stamp / SECOND)
 
@@ -301,7 +305,7 @@ class MavlinkBridgeNode(UamNode):
         if (state - self._commanded) / SECOND >= self._options.stale_after:
             self._join.skip(state)
             self._last_tick = time.monotonic()
-            setpoint = self._go_without(state)
+            setpoint = self._go_without(state, self._old(state))
             self._setpoint.publish(self._writer.fill(state, *sent(setpoint)))
             self.done_tick(state, time.perf_counter())
 
@@ -322,9 +326,9 @@ class MavlinkBridgeNode(UamNode):
             return
         self._go_without(self.stamp + round(silence * SECOND))
 
-    def _go_without(self, stamp: int) -> Setpoint:
+    def _go_without(self, stamp: int, old: bool = False) -> Setpoint:
         """Run a tick at `stamp` [ns] without commands; return the setpoint sent."""
-        self._begin_tick(stamp)
+        self._begin_tick(stamp, old)
         setpoint = self.stage.without(stamp)
         self._end_tick(stamp)
         return setpoint

@@ -137,13 +137,13 @@ class BridgeStage:
         """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
         self.source.note_state(stamp / SECOND, state)
 
-    def hear(self, stamp: int, frozen: float = 0.0) -> None:
+    def hear(self, stamp: int, old: bool = False) -> None:
         """Take what the autopilot has sent, and the mission's status that counts by now.
 
-        frozen [s]: for how long the process of the bridge has not run, where that is known.
+        old: whether the tick has waited while a process stood still: it gets no setpoint.
         """
         self.autopilot.poll(stamp / SECOND)
-        self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, frozen)
+        self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, old)
         while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
             commanded, self.sequence.let_go, regains = self._orders.popleft()
             if regains > self._regains:

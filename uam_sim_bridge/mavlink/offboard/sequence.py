@@ -53,7 +53,6 @@ LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OF
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
 ARMING_UNDERWAY = 2.0  # s after a request to arm in which the autopilot may still obey it
 NEW_REPORTS = 0.6  # s after a gap until each report is new: PX4 sends its mode twice a second
-OLD_TICKS = 0.2  # s of ticks that wait for a process that has not run
 FORCED = 5.0  # s after a kill: disarmed by force, as PX4 does (COM_KILL_DISARM); it may lie tilted
 KILLED = "kill engaged"  # PX4's text; the heartbeat, once a second, misses a short kill
 BY_SWITCH = "the pilot's kill switch has stopped the motors"
@@ -182,7 +181,7 @@ class OffboardSequence:
         self._person = False  # a person has chosen the mode of the released vehicle
         self._begun = -math.inf  # [s] the last tick that began
         self._resumed = -math.inf  # [s] newest end of a gap of the stream
-        self._current = -math.inf  # [s] until when ticks may be those of before a gap
+        self._old = False  # the tick that began last has waited for this process, or another
         self._stop: Request | None = None  # repeated until the vehicle is disarmed
         self._halted = math.inf  # [s] since when
         self._time = 0.0  # [s] of the last update
@@ -243,12 +242,11 @@ class OffboardSequence:
         self.released_to = ""
         self._fail(why)
 
-    def begin(self, time: float, loss_time: float, frozen: float = 0.0) -> None:
+    def begin(self, time: float, loss_time: float, old: bool = False) -> None:
         """Begin the tick `time` [s], before its setpoint is made.
 
-        loss_time [s]: without setpoints until the autopilot's failsafe begins; frozen [s]: for how
-        long this process has not run, by another clock than that of the ticks: old ticks may come
-        first. If none is missing after them, the time of the ticks stood still, too.
+        loss_time [s]: without setpoints until the autopilot's failsafe begins; old: the tick has
+        waited while a process stood still, see `Waited`.
         """
         # a little longer: a failsafe that has just begun, or not quite, is seen by its report
         lost = time - self._streamed > loss_time + SETTLING
@@ -257,18 +255,16 @@ class OffboardSequence:
             self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
         elif self.withheld and time - self._begun > loss_time:
             self._resumed = time
-        if frozen > loss_time:
-            self._current = time + OLD_TICKS
-        self._begun = time
+        self._begun, self._old = time, old
 
     @property
     def withheld(self) -> bool:
-        """Whether a gap of the stream has just ended, and the newest reports may be older.
+        """Whether the tick is old, or a gap of the stream has just ended and reports may be older.
 
         The autopilot returns to OFFBOARD with the first setpoint: the vehicle may stand by now.
         """
         old = self._begun < self._resumed + NEW_REPORTS
-        return self._begun < self._current or (self.phase is Phase.RELEASED and old)
+        return self._old or (self.phase is Phase.RELEASED and old)
 
     @property
     def after_loss(self) -> bool:
