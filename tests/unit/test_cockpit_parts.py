@@ -263,6 +263,8 @@ def test_the_next_port_is_taken_where_one_is_in_use():
     with socket.create_server((page_address.LOCAL, 0)) as taken:
         port = taken.getsockname()[1]
         assert page_address.free_port(page_address.LOCAL, port) > port
+        # in steps, the ports of two flights never meet
+        assert (page_address.free_port(page_address.LOCAL, port, 40) - port) % 40 == 0
     with pytest.raises(page_address.AddressError, match="cannot serve on 203.0.113.7"):
         page_address.free_port("203.0.113.7", 8080)
 

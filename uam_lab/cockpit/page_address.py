@@ -7,7 +7,7 @@ import socket
 
 LOCAL = "127.0.0.1"
 PORT = 8080
-TRIES = 100  # number of ports to try, from the given one on
+TRIES = 100  # number of ports to try
 
 
 class AddressError(OSError):
@@ -19,9 +19,13 @@ def address(host: str, port: int) -> str:
     return f"http://{'localhost' if host in (LOCAL, '0.0.0.0') else host}:{port}"
 
 
-def free_port(host: str, port: int) -> int:
-    """Return the first free port of TRIES from `port` on, any for 0. Raises AddressError."""
-    for number in range(port, min(port + TRIES, 65536)) if port else (0,):
+def free_port(host: str, port: int, step: int = 1) -> int:
+    """Return the first free port of TRIES: `port`, then each `step` above it; any for 0.
+
+    Raises AddressError.
+    """
+    tried = range(port, min(port + TRIES * step, 65536), step) if port else (0,)
+    for number in tried:
         try:
             with socket.create_server((host, number)) as probe:
                 return probe.getsockname()[1]

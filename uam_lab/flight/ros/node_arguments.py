@@ -22,7 +22,7 @@ from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
 from uam_sim_bridge.paced_clock import LATEST
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
-from uam_sim_bridge.ports import Ports
+from uam_sim_bridge.ports import INSTANCES, Ports
 from uam_sim_bridge.px4 import px4_parameters
 
 # Executable → module. Started and, at the end, stopped in this order, the recorder last.
@@ -110,8 +110,10 @@ def parameters(
         **settings.scenario_options.to_mapping(),
     }
     if wiring.COCKPIT not in settings.without:
+        # ports of its own: two flights that start at once never choose the same
+        first = page_address.PORT + ports.instance
         sections[wiring.COCKPIT] = {
-            "port": page_address.free_port(page_address.LOCAL, page_address.PORT),
+            "port": page_address.free_port(page_address.LOCAL, first, INSTANCES),
             "results": str(folder.path.absolute()),
         }
     return complete(sections, settings, folder)
