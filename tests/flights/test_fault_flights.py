@@ -133,6 +133,15 @@ def test_without_poses_it_leaves_the_stand_before_the_autopilot_descends(text):
     assert np.abs(series["truth.pitch"]).max() < 0.35
 
 
+@pytest.mark.parametrize(("late", "seed"), [(0.26, 1), (0.5, 2), (0.75, 1)])
+def test_a_landing_beside_the_stand_moves_clear_of_it_first(late, seed):
+    text = f"mocap_latency@take-off+3:delay={late}"
+    _, series, figures = flown(text, scenario=QUICK_PICK, seed=seed)
+    assert classify(series, figures) == "landed"
+    end = ending(series)
+    assert end.largest_tilt < 0.3 and end.impact < 0.3  # onto the stand: 3.1 rad, 3.7 m/s
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -99,7 +99,8 @@ class Mission:
         self._fell_since = math.inf  # [s] into failsafe, or by a kill
         self._end: float | None = None
         self._override = MagnetOverride()
-        self._descent: Decision | None = None  # to land, while the reference slows down for it
+        self._descent: Decision | None = None  # to land, while the reference makes ready for it
+        self._clear_at = 0.0  # stamp [s] at which the reference is clear of a stand, for that
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
         self._beside: bool | None = None  # a stand, when the autopilot's own landing began
         self._ground_pose = GroundPose()
@@ -414,7 +415,7 @@ class Mission:
             self._enter(stamp, before, decision)
         if decision.state is State.RELEASED or self._standing is not None:
             self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
-        if self._descent is not None and not self._guidance.fast:
+        if self._descent is not None and stamp >= self._clear_at and not self._guidance.fast:
             self._descend(stamp)
         if decision is not self._followed:
             self._followed = decision
@@ -443,6 +444,11 @@ class Mission:
                 guidance.stop(stamp, stow=False)
         if self._beside:
             guidance.give_way(stamp, seen.state[CHI, ARM])
+
+    def _retreat(self, stamp: float) -> float:
+        """Move clear of a stand below; return the stamp [s] of the arrival."""
+        guidance = self._guidance
+        return guidance.retreat(stamp, self._watch.clear(guidance.motion[CHI]))
 
     def _descend(self, stamp: float) -> None:
         """Begin the descent of an unplanned landing, vertically from the vehicle's position."""
@@ -482,7 +488,7 @@ class Mission:
             guidance.stop(stamp, decision.stow and event is not Event.ARRIVED)
             self._touchdown.stay()
             if state is State.BLIND:
-                guidance.retreat(stamp, self._watch.clear(guidance.motion[CHI]))
+                self._retreat(stamp)
         elif event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
@@ -491,6 +497,7 @@ class Mission:
                 guidance.stay(stamp, self._seen.state, self._ground, self._age)
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
+            self._clear_at = self._retreat(stamp)
         elif state is State.FAILSAFE:
             guidance.stop(stamp, decision.stow)
             self._fell_since = stamp

@@ -336,16 +336,20 @@ class Guidance:
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
-    def retreat(self, stamp: float, way: np.ndarray) -> None:
-        """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it."""
+    def retreat(self, stamp: float, way: np.ndarray) -> float:
+        """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it.
+
+        Returns the stamp [s] of the arrival, `stamp` without a way.
+        """
         if not np.any(way) or not self._take(Cue.RETREAT):
-            return
+            return stamp
         goal, lengths = self._at_rest(stow=False)
         goal[POSITION] += way
         hardest = HARDEST * float(np.linalg.norm(way)) / self.parameters.brake_acceleration
         lengths[:] = max(float(np.max(lengths)), math.sqrt(hardest))
         self._plans.pop(True, None)
         self._brake, self._away = Segment(stamp, self.motion, goal, lengths, BASE), None
+        return self._brake.end
 
     def _take(self, cue: Cue) -> bool:
         """Change the course by the table of `course`; return whether the cue has a transition."""
