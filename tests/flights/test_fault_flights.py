@@ -139,7 +139,7 @@ def test_a_landing_beside_the_stand_moves_clear_of_it_first(late, seed):
     _, series, figures = flown(text, scenario=QUICK_PICK, seed=seed)
     assert classify(series, figures) == "landed"
     end = ending(series)
-    assert end.largest_tilt < 0.3 and end.impact < 0.3  # onto the stand: 3.1 rad, 3.7 m/s
+    assert end.largest_tilt < 0.3 and end.impact < 0.4  # onto the stand: 3.1 rad, 3.7 m/s
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,8 @@ from uam_control.supervision import (
 from uam_control.vehicle import VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
+# landings after a hold that nobody asked for here: not where a stand is
+UNASKED = (Event.HELD_TOO_LONG, Event.CLEAR_TO_LAND)
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
@@ -497,7 +499,8 @@ class Mission:
                 guidance.stay(stamp, self._seen.state, self._ground, self._age)
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
-            self._clear_at = self._retreat(stamp)
+            if event in UNASKED:
+                self._clear_at = self._retreat(stamp)
         elif state is State.FAILSAFE:
             guidance.stop(stamp, decision.stow)
             self._fell_since = stamp

@@ -149,7 +149,7 @@ class MissionParameters(
     )
     takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
     clear_distance: float = number(
-        0.7, "from a payload's stand, before it lands unplanned", "m", 0.0, 10.0
+        0.7, "from a payload's stand, before a landing after a hold", "m", 0.0, 10.0
     )
     clear_height: float = number(0.2, "climb on the way to clear_distance", "m", 0.0, 5.0)
     touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.15)
