@@ -13,7 +13,9 @@ import importlib
 import json
 import math
 import random
+import signal
 import struct
+import threading
 import time
 from contextlib import suppress
 
@@ -203,20 +205,21 @@ def main() -> None:
     rng.seed(options.seed)
     known: dict[str, Target] = {}
     end, looked, covered = time.monotonic() + options.seconds, 0.0, False
-    with suppress(KeyboardInterrupt):
-        while (now := time.monotonic()) < end:
-            if now - looked > LOOK_PERIOD:
-                looked = now
-                targets(node, known)
-                if not covered and known and min(t.sent for t in known.values()) >= options.each:
-                    covered = True
-                    print("covered", flush=True)
-            for target in list(known.values()):
-                target.listen()
-                target.send(rng)
-                time.sleep(1.0 / options.rate)
-            if not known:
-                time.sleep(0.1)
+    stop = threading.Event()  # an exception of the signal could be lost in a call of the middleware
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    while not stop.is_set() and (now := time.monotonic()) < end:
+        if now - looked > LOOK_PERIOD:
+            looked = now
+            targets(node, known)
+            if not covered and known and min(t.sent for t in known.values()) >= options.each:
+                covered = True
+                print("covered", flush=True)
+        for target in list(known.values()):
+            target.listen()
+            target.send(rng)
+            time.sleep(1.0 / options.rate)
+        if not known:
+            time.sleep(0.1)
     print(json.dumps({topic: target.sent for topic, target in sorted(known.items())}))
     node.destroy_node()
     rclpy.shutdown()

@@ -37,7 +37,7 @@ def fuzzed(fly, folder, *options, until="hover"):
     domain = flight.said.split("in ROS domain ")[1].split(",")[0]
     surroundings = {**os.environ, **transport_environment(), "ROS_DOMAIN_ID": domain}
     fuzz = subprocess.Popen(
-        [sys.executable, FUZZ, "--seconds", "3600", "--each", "8"],
+        [sys.executable, FUZZ, "--seconds", str(whole_flight.PATIENCE), "--each", "8"],
         env=surroundings,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
