@@ -72,8 +72,13 @@ def complete(flight):
     assert not {name for name in lost if "/uam/state" in name or "/imu/" in name}
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("options", [(), ("--fused",)], ids=["separate", "fused"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param((), id="separate", marks=pytest.mark.long),
+        pytest.param(("--fused",), id="fused", marks=pytest.mark.slow),  # for the time of CI
+    ],
+)
 def test_a_fuzzed_flight_ends_complete_with_every_node_alive(fly, tmp_path, options):
     complete(fuzzed(fly, tmp_path, *options))
 
