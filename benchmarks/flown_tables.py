@@ -29,7 +29,6 @@ from uam_lab.library.flight_result import FlightResult
 from uam_lab.report.build import stability_of
 
 TABLES = Path(__file__).with_suffix(".yaml")
-AXES = ("roll", "pitch")
 NONE = float("nan")
 
 
@@ -58,11 +57,10 @@ def figures(result: FlightResult) -> dict[str, Any]:
         began = metrics["faults"][0]["begin_s"]
         later = (t for t in metrics["transitions"] if t["time_s"] > began)
         first = next((t for t in later if t["cause"] != "as planned"), None)
-        roll, pitch = (series[f"truth.{name}"][series["time"] >= began] for name in AXES)
         found |= {
             "reaction": first["to"] if first else "none",
             "after": first["time_s"] - began if first else NONE,
-            "tilt": np.degrees(np.arccos(np.cos(roll) * np.cos(pitch))).max(),
+            "tilt": np.degrees(series.tilt[series.time >= began].max()),
         }
     return found
 

@@ -60,7 +60,7 @@ def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
     limits = limits or OutcomeLimits()
     height = series["truth.z"] - series["truth.z"][0]
     velocity = np.column_stack([series[f"truth.{axis}_dot"] for axis in "xyz"])
-    tilts = np.arccos(np.clip(np.cos(series["truth.roll"]) * np.cos(series["truth.pitch"]), -1, 1))
+    tilts = series.tilt
     low = height < limits.near_ground
     return Ending(
         height=float(height[-1]),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.coordinates import POSITION
 from uam_lab.results.timeseries import Series
 
 TRAJECTORY = "trajectory"  # phase of the scenario at its full speed
@@ -47,8 +47,6 @@ def figures(
     """
     error, times = series.block("error.")[rows], series.time[rows]
     away = distance(series, rows)
-    truth = series.block("truth.")[rows][:, ATTITUDE]
-    upright = np.cos(truth[:, 0]) * np.cos(truth[:, 1])
     thrust = sum(
         series[name][rows]
         for name in series.columns.names
@@ -64,6 +62,6 @@ def figures(
             key: (factor * np.sqrt(np.mean(error[:, columns] ** 2, axis=0))).tolist()
             for key, columns, factor in groups
         },
-        "tilt_deg": float(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0)).max())),
+        "tilt_deg": float(np.degrees(series.tilt[rows].max())),
         "thrust_n": float(np.max(thrust)),
     }

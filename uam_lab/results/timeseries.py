@@ -207,6 +207,12 @@ class Series:
         """Mission time [s], 0 at the take-off command."""
         return self["time"]
 
+    @property
+    def tilt(self) -> np.ndarray:
+        """Return the true tilt (ticks,) [rad]."""
+        upright = np.cos(self["truth.roll"]) * np.cos(self["truth.pitch"])
+        return np.arccos(np.clip(upright, -1.0, 1.0))
+
     @cached_property
     def flown(self) -> np.ndarray:
         """Mask (ticks,): from the take-off command to the touchdown command.
