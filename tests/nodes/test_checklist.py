@@ -242,8 +242,14 @@ def test_all_steps_pass_and_are_recorded(probe, start, tmp_path):
         "arm_controller/reset_adaptation": [None],
         "mission/magnet": [True, False],
     }
-    recorded = json.loads(file.read_text())
-    assert recorded["passed"] and not recorded["failing"]
+
+    def permitted():
+        recorded.update(json.loads(file.read_text()))
+        return recorded["passed"] and not recorded["failing"]
+
+    # a test that had no processor for a second has lost the permission: it comes back
+    recorded = {}
+    hands.until(permitted, "the record of the permission")
     items = {one["name"]: one for one in recorded["items"]}
     assert items["clear"]["confirmed_by_person"] and not items["tilt_roll"]["confirmed_by_person"]
     assert "gyro against mocap" in items["tilt_roll"]["value"]
