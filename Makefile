@@ -27,7 +27,7 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 # Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
 AT_ONCE := -n 4 --dist loadgroup --no-loadscope-reorder
 test: setup      ## all but the long and the slow tests; options: make test ARGS="tests/unit -x"
-	@$(BIN)/python -m uam_lab.flight.direct.warm_up --all-laws
+	@$(BIN)/python -m uam_lab.flights.direct.warm_up --all-laws
 	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow and not long" $(AT_ONCE) tests)
 
 long: setup      ## further flights, examples among them; CI runs these, too
@@ -63,6 +63,6 @@ $(STAMP): $(INSTALLED_FROM)
 	  echo "setup: installing uam[$$extras] into $(VENV), once (a few minutes)"; \
 	  $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e ".[$$extras]" || { \
 	  echo "setup: the installation failed; the lines above say why" >&2; exit 2; }
-	@$(BIN)/python -m uam_lab.flight.direct.warm_up
-	@$(BIN)/python -c "import uam_lab.flight.ros.forker, uam_lab.report.build"
+	@$(BIN)/python -m uam_lab.flights.direct.warm_up
+	@$(BIN)/python -c "import uam_lab.flights.ros.forker, uam_lab.report.build"
 	@touch $@

@@ -13,8 +13,8 @@ import argparse
 import numpy as np
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.campaign.trial import Trial, fly
-from uam_lab.results.timeseries import Series
+from uam_lab.experiments.campaign.trial import Trial, fly
+from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant.effects import presets
 
 SCENARIOS = ("circle_fast", "lemniscate")

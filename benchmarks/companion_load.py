@@ -16,7 +16,7 @@ import psutil
 from rich.console import Console
 from rich.table import Table
 
-from uam_lab.processes.process_table import nodes
+from uam_lab.flights.processes.process_table import nodes
 
 
 def main() -> int:

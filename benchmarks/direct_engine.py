@@ -24,8 +24,8 @@ import mujoco
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.direct.warm_up import prepare_direct
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.direct.warm_up import prepare_direct
 from uam_sim_bridge.plant import Vehicle
 
 STRETCH = 250  # ticks

@@ -3,8 +3,8 @@
     .venv/bin/python benchmarks/flown_tables.py vehicles     # docs/your_vehicle.md
     .venv/bin/python benchmarks/flown_tables.py --list       # all tables
 
-flown_tables.yaml has the flights: per row the options of `uam_lab.library.flight.Flight`, over
-those of `all`. `row` (a line, or several) takes the row's label and the values below:
+flown_tables.yaml has the flights: per row the options of `uam_lab.Flight`, over those of `all`.
+`row` (a line, or several) takes the row's label and the values below:
 
 - position [mm], attitude [deg], arm [deg]: RMS per axis from take-off command to touchdown command;
 - path: 3-D RMSE of the phase `trajectory` [mm]; payload: from its place [cm];
@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from uam_lab.library.flight import Flight
-from uam_lab.library.flight_result import FlightResult
+from uam_lab.flights.library.flight import Flight
+from uam_lab.flights.library.flight_result import FlightResult
 from uam_lab.report.build import stability_of
 
 TABLES = Path(__file__).with_suffix(".yaml")

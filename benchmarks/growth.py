@@ -24,9 +24,9 @@ from growing import curves, flights
 from growing.flights import NotFlown, Point
 from growing.vehicles import with_joints, with_rotors
 
-from uam_lab.budget.flown import LAYOUTS
-from uam_lab.budget.shuttle import shuttle
-from uam_lab.results.result_folder import new_folder
+from uam_lab.experiments.budget.flown import LAYOUTS
+from uam_lab.experiments.budget.shuttle import shuttle
+from uam_lab.records.results.result_folder import new_folder
 
 SIZES = {"joints": (2, 3, 6), "rotors": (4, 6, 8), "vehicles": (1, 2, 3), "topics": (0, 10, 20, 40)}
 FAILED, INTERRUPTED = 1, 130

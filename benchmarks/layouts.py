@@ -24,7 +24,7 @@ from pathlib import Path
 from layout_targets import measured
 from layout_targets.targets import Value, table
 
-from uam_lab.budget.flown import LAYOUTS
+from uam_lab.experiments.budget.flown import LAYOUTS
 
 PARTS = ("lockstep", "realtime", "busy")
 MISSED, INTERRUPTED = 1, 130

@@ -29,11 +29,11 @@ import psutil
 from distributed import LocalCluster
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.campaign.trial import measure
-from uam_lab.campaign.variations import Draws, ranges
-from uam_lab.flight.direct.warm_up import prepare_direct
-from uam_lab.workers.place import Workplace
-from uam_lab.workers.workers import workers
+from uam_lab.experiments.campaign.trial import measure
+from uam_lab.experiments.campaign.variations import Draws, ranges
+from uam_lab.experiments.workers.place import Workplace
+from uam_lab.experiments.workers.workers import workers
+from uam_lab.flights.direct.warm_up import prepare_direct
 
 BLOCKS = 4  # turns of loop and worker, so that both see the same machine
 WORKER = "dask worker"  # title of a worker process

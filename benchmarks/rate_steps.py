@@ -19,12 +19,12 @@ from px4_steps.hover_flight import HoverFlight, NotFlown
 from px4_steps.rate_experiment import AXES, experiment, responses
 from px4_steps.step_response import distance, figures
 
-from uam_lab.flight.direct.warm_up import prepare
-from uam_lab.processes.node_environment import environment
-from uam_lab.processes.processes import NodeFailed, Processes
+from uam_lab.flights.direct.warm_up import prepare
+from uam_lab.flights.processes.node_environment import environment
+from uam_lab.flights.processes.processes import NodeFailed, Processes
+from uam_lab.records.results.atomic import replacing, write_rows, write_text
+from uam_lab.records.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_lab.report.figures import style
-from uam_lab.results.atomic import replacing, write_rows, write_text
-from uam_lab.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_sim_bridge.ports import PortError, Reservation
 from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 

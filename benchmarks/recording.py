@@ -26,10 +26,10 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory
 
-from uam_lab.recording import cdr
-from uam_lab.recording.bounded_log import BoundedLog
-from uam_lab.recording.mcap_reader import TopicLog, read_log
-from uam_lab.recording.message_definitions import schema
+from uam_lab.records.recording import cdr
+from uam_lab.records.recording.bounded_log import BoundedLog
+from uam_lab.records.recording.mcap_reader import TopicLog, read_log
+from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import type_name
 

@@ -15,8 +15,8 @@ import tempfile
 from pathlib import Path
 
 from uam_control.mission import ScenarioError
-from uam_lab.library.errors import FlightError
-from uam_lab.library.flight import Flight
+from uam_lab.flights.library.errors import FlightError
+from uam_lab.flights.library.flight import Flight
 
 REFERENCES = (
     *("circle", "circle_fast", "circle_payload", "lemniscate", "lemniscate_payload", "arm_sweep"),

@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 from table1_flights import flights, picture, table
 
-from uam_lab.campaign.flying import fly_all
-from uam_lab.campaign.trial import Trial
-from uam_lab.workers.place import Workplace, cores
+from uam_lab.experiments.campaign.flying import fly_all
+from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.workers.place import Workplace, cores
 
 PAYLOAD = 0.2  # [kg], the paper's
 SHOWN = 6  # rows of the search

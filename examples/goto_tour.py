@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from uam_lab import CommandRefused, Flight
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 
 TOUR = [(0.5, 0.0, 1.0, 0.0), (0.5, 0.5, 1.2, 45.0), (0.0, 0.5, 1.0, 90.0), (0.0, 0.0, 1.0, 45.0)]
 FAST = {"goal_speed": 0.6, "goal_yaw_rate": 1.0}  # [m/s], [rad/s]: the largest on the way

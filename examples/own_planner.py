@@ -15,7 +15,7 @@ from rclpy.duration import Duration
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from uam_lab import Flight
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 
 RADIUS, ROUND, STEP = 0.4, 6.0, 0.25  # [m], [s], [s]
 

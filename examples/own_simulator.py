@@ -10,7 +10,7 @@ import numpy as np
 
 from uam_control.maths import rotations as so3
 from uam_lab import Flight
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 from uam_sim_bridge.plant import Plant, Samples, Truth
 
 INERTIA, UP = np.array([0.0165, 0.0186, 0.0250]), np.array([0.0, 0.0, 9.81])  # [kg m^2], [m/s^2]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from uam_lab import Flight
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 
 FACTORS = (0.5, 1.0, 2.0)
 

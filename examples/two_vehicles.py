@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from uam_lab import Flight
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 
 
 async def leader(flight: Flight, in_the_air: asyncio.Event):

@@ -6,12 +6,12 @@ import math
 from set_clock import SetClock
 
 from uam_control.vehicle import load_description
-from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
-from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.drivers.dynamixel.port import PatientPort
-from uam_sim_bridge.drivers.dynamixel.servo_bus import ServoBus
-from uam_sim_bridge.emulation.dynamixel import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.devices.dynamixel.port import PatientPort
+from uam_sim_bridge.devices.dynamixel.servo_bus import ServoBus
 
 BAUD = 1_000_000
 STOWED = (0.0, math.pi / 2)

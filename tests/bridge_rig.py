@@ -8,6 +8,7 @@ from geometry_msgs.msg import TwistStamped
 from quadrotor import MASS, Quadrotor
 from std_msgs.msg import Bool
 
+from uam_control.frames import swap_body
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
@@ -16,7 +17,6 @@ from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 
 MODULE = "uam_sim_bridge.nodes.mavlink_bridge"

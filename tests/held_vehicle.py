@@ -11,8 +11,8 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
-from uam_lab.checklist.samples import GyroIntegral, Sample, rotation_vector
-from uam_lab.checklist.step import Situation, StepState
+from uam_lab.preflight.checklist.samples import GyroIntegral, Sample, rotation_vector
+from uam_lab.preflight.checklist.step import Situation, StepState
 
 PERIOD = 0.04  # [s] between two samples
 GRAVITY = 9.81

@@ -92,7 +92,7 @@ class Forks:
 
 def serve(connection: socket.socket) -> list | None:
     """Import and fork for each request: return it in the child; None in the parent at the end."""
-    importlib.import_module("uam_lab.flight.ros.forker")  # from which a flight forks its nodes
+    importlib.import_module("uam_lab.flights.ros.forker")  # from which a flight forks its nodes
     lines = connection.makefile("rw")
     wake, woken = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signal.set_wakeup_fd(woken)

@@ -8,7 +8,7 @@ import struct
 import threading
 import time
 
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
+from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 PORT = 14550  # of PX4's ground station, whatever its instance

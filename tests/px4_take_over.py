@@ -16,9 +16,9 @@ from pyulog import ULog
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.maths.rotations import matrix_from_euler
-from uam_lab.results import timeseries
+from uam_control.offboard.modes import MavCmd
+from uam_lab.records.results import timeseries
 from uam_msgs_py.messages.status import MissionStatus
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd
 
 OFFBOARD, ARMED = 14, 2  # nav_state and arming_state of PX4's vehicle_status
 BRIDGE = 191  # MAV_COMP_ID_ONBOARD_COMPUTER

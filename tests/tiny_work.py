@@ -39,8 +39,8 @@ def prepare() -> None:
 
 def main() -> None:
     """Work on local workers until a signal comes; print their processes first."""
-    from uam_lab.workers.place import Workplace
-    from uam_lab.workers.workers import workers
+    from uam_lab.experiments.workers.place import Workplace
+    from uam_lab.experiments.workers.workers import workers
 
     with workers(Workplace(2)) as crew:
         for _, result in crew.completed(slow, iter(range(10**6))):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from uam_control.maths.rotations import quaternion_from_euler, quaternion_multiply
-from uam_sim_bridge.drivers.mocap.frame import BodyPose
-from uam_sim_bridge.drivers.mocap.measurement import TimedPose
+from uam_sim_bridge.devices.mocap.frame import BodyPose
+from uam_sim_bridge.devices.mocap.measurement import TimedPose
 
 RATE = 120.0
 STANDING = 0.28  # [m] base_link above the floor

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import psutil
 
-from uam_lab.processes import process_table
+from uam_lab.flights.processes import process_table
 from uam_sim_bridge.ports import SIMULATOR_TCP
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -13,17 +13,17 @@ from unittest import mock
 import numpy as np
 from free_port import free_port
 
+from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
+from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, FORCE, MavCmd, Mode
 from uam_control.profiles.profile import load_profile
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description
-from uam_lab.flight.direct import flight as direct
+from uam_lab.flights.direct import flight as direct
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST, UdpPort
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, FORCE, MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle

@@ -9,15 +9,15 @@ from collections import Counter, deque
 import numpy as np
 
 from fuzzing.messages import number
+from uam_control.frames import swap_body
+from uam_control.offboard.sequence import OffboardSequence, Phase
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, SetpointRefused
+from uam_control.setpoints.thrust_identification import ThrustIdentification
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
-from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentification
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 PERIOD = 0.004  # s

@@ -19,9 +19,9 @@ from uam_control.laws import catalogue
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
-from uam_lab.budget.flown import CONTROL
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.processes.process_table import nodes
+from uam_lab.experiments.budget.flown import CONTROL
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.processes.process_table import nodes
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.ports import INSTANCES, ports_of
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from uam_lab.processes.node_environment import ros_environment
-from uam_lab.recording.topic_recorder import TopicRecorder
+from uam_lab.flights.processes.node_environment import ros_environment
+from uam_lab.records.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node.base_node import StopSignal
 from uam_msgs_py.node.rightful import RightfulNodes

@@ -12,7 +12,7 @@ from pathlib import Path
 from loading.conditions import CONDITIONS, under
 
 from layout_targets.targets import BUSY, CORES, MISSED, P50, P99, PACE, Value
-from uam_lab.results.result_folder import new_folder
+from uam_lab.records.results.result_folder import new_folder
 from uam_sim_bridge.ports import INSTANCES, ports_of
 
 UAM = (sys.executable, "-m", "uam_lab.cli.main")

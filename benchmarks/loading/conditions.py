@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_lab.processes.node_environment import ros_environment
+from uam_lab.flights.processes.node_environment import ros_environment
 from uam_sim_bridge.ports import discovery_port, in_use
 
 BLOCK = 8_000_000  # bytes

@@ -12,18 +12,18 @@ import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ARM, ATTITUDE, CHI, POSITION
+from uam_control.frames import swap_body
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.mission.motion.trajectory import empty_reference
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustMap
+from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
-from uam_sim_bridge.mavlink.protocol.modes import Mode
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant

@@ -16,10 +16,10 @@ import psutil
 from soaking.samples import Soak, usage
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.budget.shuttle import shuttle
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.processes.process_table import nodes
-from uam_lab.results.result_folder import new_folder
+from uam_lab.experiments.budget.shuttle import shuttle
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.processes.process_table import nodes
+from uam_lab.records.results.result_folder import new_folder
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 10.0  # [s] wall time between two samples

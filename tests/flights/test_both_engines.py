@@ -21,10 +21,10 @@ from default_columns import COLUMNS
 from uam_control.coordinates import BASE_COORDINATES
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import timeseries
-from uam_lab.results.outcome import transitions
-from uam_lab.results.timeseries import SUBSYSTEMS
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.outcome import transitions
+from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

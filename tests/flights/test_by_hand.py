@@ -12,9 +12,9 @@ import rclpy
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from uam_lab.flight.operator import NoFlight, Operator
-from uam_lab.flight.ros.node_arguments import MODULES
-from uam_lab.processes.node_environment import ros_environment
+from uam_lab.flights.operator import NoFlight, Operator
+from uam_lab.flights.processes.node_environment import ros_environment
+from uam_lab.flights.ros.node_arguments import MODULES
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.ports import Reservation

@@ -12,10 +12,10 @@ from distributed import LocalCluster
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_lab.campaign.variations import Draws, VariationError, common, ranges
 from uam_lab.cli import fly as fly_command
 from uam_lab.cli.main import main
-from uam_lab.results.metrics import GROUPS
+from uam_lab.experiments.campaign.variations import Draws, VariationError, common, ranges
+from uam_lab.records.results.metrics import GROUPS
 
 FLIGHTS = 4
 

@@ -11,8 +11,8 @@ from rclpy.executors import SingleThreadedExecutor
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from uam_lab.processes.guest import Guest
-from uam_lab.processes.node_environment import transport_environment
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.processes.node_environment import transport_environment
 from uam_msgs_py.node.node_parameters import plain
 
 # extra `browser`; make slow installs it

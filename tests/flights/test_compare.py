@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from uam_lab.campaign import trial
 from uam_lab.cli.main import main
-from uam_lab.compare import plan
+from uam_lab.experiments.campaign import trial
+from uam_lab.experiments.compare import plan
 
 
 def compare(out, *options):

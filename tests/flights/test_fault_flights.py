@@ -16,11 +16,11 @@ import pytest
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.supervision import Event, State
-from uam_lab.campaign.fault_outcome import classify, ending
 from uam_lab.cli.main import main
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import metrics
-from uam_lab.results.outcome import transitions
+from uam_lab.experiments.campaign.fault_outcome import classify, ending
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results import metrics
+from uam_lab.records.results.outcome import transitions
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from whole_flight import assert_nothing_left
 
-from uam_lab.results.timeseries import read
+from uam_lab.records.results.timeseries import read
 from uam_msgs_py.node import wiring
 
 LEVEL = 0.5  # [rad]

@@ -11,8 +11,8 @@ import pytest
 import whole_flight
 from whole_flight import SHORT
 
-from uam_lab.processes.node_environment import transport_environment
-from uam_lab.results import timeseries
+from uam_lab.flights.processes.node_environment import transport_environment
+from uam_lab.records.results import timeseries
 from uam_msgs_py.messages import topics
 
 FUZZ = Path(__file__).parents[1] / "fuzz_topics.py"

@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from whole_flight import Flight
 
-from uam_lab.processes.node_environment import transport_environment
-from uam_lab.results import timeseries
+from uam_lab.flights.processes.node_environment import transport_environment
+from uam_lab.records.results import timeseries
 from uam_msgs_py.messages.status import ERROR
 from uam_sim_bridge.ports import Reservation
 

@@ -7,8 +7,8 @@ from flight_warnings import last_values, staying, warnings
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import metrics
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results import metrics
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

@@ -10,10 +10,10 @@ from wired_flight import KILL_CHANNEL, wired_flight
 
 from uam_control.coordinates import CHI, Z
 from uam_control.mission import load_scenario
+from uam_control.offboard.modes import MavCmd, Mode
 from uam_control.profiles.profile import load_profile
 from uam_control.supervision import Event, State
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, Mode
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 
 GROUND, TAKE_OFF, HOVER, CARRY = "waiting", "take-off", "approach", "carry"

@@ -15,7 +15,7 @@ from uam_lab import (
     NotInTime,
     Observer,
 )
-from uam_lab.flight.ros import node_arguments
+from uam_lab.flights.ros import node_arguments
 from uam_sim_bridge.faults import FaultError
 
 

@@ -5,7 +5,7 @@ import rclpy
 from rclpy.node import Node
 from whole_flight import Flight
 
-from uam_lab.processes.node_environment import ros_environment
+from uam_lab.flights.processes.node_environment import ros_environment
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.node import wiring

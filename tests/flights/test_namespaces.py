@@ -4,7 +4,7 @@ import json
 
 from mcap.reader import make_reader
 
-from uam_lab.results import timeseries
+from uam_lab.records.results import timeseries
 
 SHARED = {"/tf", "/tf_static", "/diagnostics", "/rosout"}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from whole_flight import ROOT, Flight
 
-from uam_lab.results import timeseries
+from uam_lab.records.results import timeseries
 
 PLANT = "rigid_body_plant:RigidBodyPlant"
 

@@ -14,9 +14,9 @@ from rclpy.parameter import Parameter
 from uam_control.profiles.profile import load_profile
 from uam_control.settings.parameter_set import Bound
 from uam_control.stamps import SECOND
-from uam_lab.processes.guest import Guest
-from uam_lab.processes.node_environment import transport_environment
-from uam_lab.results import timeseries
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.processes.node_environment import transport_environment
+from uam_lab.records.results import timeseries
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.parameter_changes import ParameterChange

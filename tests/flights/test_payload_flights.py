@@ -9,9 +9,9 @@ import pytest
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results.metrics import compute
-from uam_lab.results.outcome import grasp_decisions
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results.metrics import compute
+from uam_lab.records.results.outcome import grasp_decisions
 from uam_sim_bridge.plant import Vehicle
 
 

@@ -16,9 +16,9 @@ from wired_flight import Steps, WiredAutopilot, wired_flight
 
 from uam_control.coordinates import ATTITUDE, CHI
 from uam_control.maths.rotations import matrix_from_euler
+from uam_control.offboard.modes import Mode
 from uam_control.supervision import OperatorCommand, State
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_lab.flights.direct.flight import DirectFlight
 
 # phases of quick_pick, and the time [s] in the phase at which somebody takes over
 TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = "take-off", "approach", "pick", "carry", "land"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_lab.library.flight import Flight
+from uam_lab.flights.library.flight import Flight
 
 
 def flown(tmp_path, **options):

@@ -13,8 +13,8 @@ import psutil
 import pytest
 import yaml
 
-from uam_lab.processes.process_table import nodes
-from uam_lab.vehicle.lab_file import template
+from uam_lab.flights.processes.process_table import nodes
+from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE
 
 pytestmark = pytest.mark.slow

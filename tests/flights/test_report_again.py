@@ -6,9 +6,9 @@ import shutil
 import pytest
 
 from uam_lab.cli import main
+from uam_lab.records.rebuild import rebuild
+from uam_lab.records.results import timeseries
 from uam_lab.report.figures import figures
-from uam_lab.report.rebuild import rebuild
-from uam_lab.results import timeseries
 
 
 @pytest.fixture

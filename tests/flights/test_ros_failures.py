@@ -10,9 +10,9 @@ import pytest
 from mcap.reader import make_reader
 from whole_flight import assert_nothing_left, wait_until_gone
 
-from uam_lab.doctor.finding import Verdict
-from uam_lab.doctor.ros import room
-from uam_lab.results import timeseries
+from uam_lab.preflight.doctor.finding import Verdict
+from uam_lab.preflight.doctor.ros import room
+from uam_lab.records.results import timeseries
 from uam_sim_bridge.ports import Reservation, held, lock_file
 
 

@@ -9,8 +9,8 @@ from whole_flight import assert_nothing_left
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.cli.main import main
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.report.rebuild import rebuild
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.rebuild import rebuild
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from uam_lab.records.results import timeseries
 from uam_lab.report.facts.paper import RMS
-from uam_lab.results import timeseries
 
 
 @pytest.mark.slow

@@ -13,9 +13,9 @@ from rclpy.parameter import Parameter
 from whole_flight import assert_nothing_left
 
 from uam_control.settings.configuration import path
-from uam_lab.processes.guest import Guest
-from uam_lab.processes.node_environment import transport_environment
-from uam_lab.report.rebuild import rebuild
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.processes.node_environment import transport_environment
+from uam_lab.records.rebuild import rebuild
 from uam_msgs_py.node.wiring import ARM, ATTITUDE, POSITION
 
 

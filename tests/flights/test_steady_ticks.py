@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import load_scenario
+from uam_control.offboard.modes import Mode
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.supervision import OperatorCommand, State
 from uam_control.vehicle import load_description
-from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.faults.schedule import read_schedule
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.plant import PhysicsError, Vehicle
 from uam_sim_bridge.plant.effects import presets
 

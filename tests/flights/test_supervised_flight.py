@@ -12,8 +12,8 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.supervision import OperatorCommand, State
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results.metrics import compute
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results.metrics import compute
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

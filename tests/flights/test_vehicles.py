@@ -19,9 +19,9 @@ from uam_control.profiles.profile import default_profile
 from uam_control.supervision import State
 from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import timeseries
-from uam_lab.results.metrics import compute
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
 
 FLIGHTS = [

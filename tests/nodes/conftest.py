@@ -13,7 +13,7 @@ from node_forks import Forked, Forks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from uam_lab.processes.node_environment import ros_environment
+from uam_lab.flights.processes.node_environment import ros_environment
 from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 from uam_sim_bridge.ports import Reservation

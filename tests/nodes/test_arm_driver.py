@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, Trigger
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointCommandWriter, read_joints, read_values
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
 
 MODULE = "uam_sim_bridge.nodes.arm_driver"
 NAMES = ["alpha_1", "alpha_2"]

@@ -11,16 +11,16 @@ import pytest
 from free_port import free_port
 from quadrotor import MASS, Quadrotor
 
+from uam_control.frames import swap_body
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardParameters, OffboardSequence, Phase
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence, Phase
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 MODULES = (
-    *(f"uam_lab.nodes.{name}" for name in ("recorder", "cockpit", "checklist")),
+    "uam_lab.records.recorder",
+    "uam_lab.cockpit.cockpit_node",
+    "uam_lab.preflight.checklist_node",
     *(f"uam_sim_bridge.nodes.{name}" for name in ("laboratory", "mujoco_sim")),
 )
 

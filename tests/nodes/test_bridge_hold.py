@@ -8,10 +8,10 @@ import pytest
 from bridge_rig import PERIOD, WEIGHT, read_setpoint
 
 from uam_control.maths.rotations import quaternion_from_euler
+from uam_control.offboard.modes import Mode
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.status import MissionStatus
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 
 def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):

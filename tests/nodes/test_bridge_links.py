@@ -10,9 +10,9 @@ import pytest
 from autopilot_on_a_line import AutopilotOnALine
 from bridge_rig import MODULE, WEIGHT
 
+from uam_control.offboard.modes import Mode
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 

@@ -27,7 +27,7 @@ from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, RadioState
 
-MODULE = "uam_lab.nodes.checklist"
+MODULE = "uam_lab.preflight.checklist_node"
 JOINTS = arm_coordinates(2)
 NODES = "mission,mavlink_bridge,recorder,state_estimator"
 # the test publishes slower than a vehicle does, and its computer has no governor to set

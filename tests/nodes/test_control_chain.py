@@ -12,7 +12,7 @@ from uam_control.mission import Mission, StartParameters, load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.stamps import SECOND
 from uam_control.supervision import Readings
-from uam_lab.flight.ros.node_arguments import FUSED
+from uam_lab.flights.ros.node_arguments import FUSED
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,

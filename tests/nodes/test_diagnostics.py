@@ -24,8 +24,8 @@ NODES = {
     "uam_control.nodes.mission": "/uam/state",
     "uam_sim_bridge.nodes.mavlink_bridge": "/uam/attitude/command",
     "uam_sim_bridge.nodes.mujoco_sim": "/uam/setpoint",
-    "uam_lab.nodes.scene": "/uam/mission/status",
-    "uam_lab.nodes.recorder": "/uam/state",
+    "uam_lab.cockpit.scene": "/uam/mission/status",
+    "uam_lab.records.recorder": "/uam/state",
 }
 
 

@@ -93,7 +93,7 @@ def test_a_recorder_in_a_namespace_outlives_broken_messages(start, probe, tmp_pa
     reports = probe.collect(topics.DIAGNOSTICS)
     file = tmp_path / "log.mcap"
     recorder = start(
-        "uam_lab.nodes.recorder", "--ros-args", "-r", "__ns:=/uav1", "-p", f"file:={file}"
+        "uam_lab.records.recorder", "--ros-args", "-r", "__ns:=/uav1", "-p", f"file:={file}"
     )
     probe.until(lambda: out.get_subscription_count() >= 1, "the recorder listens")
 

@@ -10,7 +10,7 @@ from rcl_interfaces.srv import ListParameters, SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_lab.flight.ros.node_arguments import FUSED, MODULES
+from uam_lab.flights.ros.node_arguments import FUSED, MODULES
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_state
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter

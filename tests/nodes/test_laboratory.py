@@ -10,7 +10,7 @@ from free_port import free_port
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_state
-from uam_sim_bridge.drivers.mocap.natnet_source import NatNetSource
+from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 from uam_sim_bridge.mavlink.transport.transport import open_transport
 

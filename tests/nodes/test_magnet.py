@@ -6,8 +6,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Bool
 
+from uam_control.offboard.modes import MavCmd
 from uam_msgs_py.messages import topics
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd
 
 MODULE, NAME = "uam_sim_bridge.nodes.magnet_driver", "magnet_driver"
 

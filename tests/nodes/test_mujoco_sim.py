@@ -89,7 +89,7 @@ def test_the_list_of_wires_is_that_of_the_running_nodes(start, probe, tmp_path):
     ports = ["--ros-args", "-p", f"local_port:={free_port(socket.SOCK_STREAM)}"]
     nodes += [start(MODULE, *options()), start("uam_sim_bridge.nodes.mavlink_bridge", *ports)]
     file = ["--ros-args", "-p", f"file:={tmp_path / 'log.mcap'}"]
-    nodes.append(start("uam_lab.nodes.recorder", *file))
+    nodes.append(start("uam_lab.records.recorder", *file))
     probe.until(lambda: wiring.missing(probe.node, recorded=True) == [], "all are there")
     for wire in wiring.WIRES:
         found = probe.node.get_subscriptions_info_by_topic(wire.topic.name)

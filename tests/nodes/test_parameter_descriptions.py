@@ -8,7 +8,7 @@ from free_port import free_port
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
-from uam_lab.flight.ros.node_arguments import FUSED, MODULES
+from uam_lab.flights.ros.node_arguments import FUSED, MODULES
 from uam_msgs_py.node import wiring
 
 # declared by rclpy itself

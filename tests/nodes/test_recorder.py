@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
-from uam_lab.recording.mcap_reader import UnreadableLog, read_log
+from uam_lab.records.recording.mcap_reader import UnreadableLog, read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
 from uam_msgs_py.messages.layouts import stamp_of
@@ -21,7 +21,7 @@ from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.messages.transforms import transforms_message
 from uam_msgs_py.node.connections import WRITERS, Connections
 
-MODULE = "uam_lab.nodes.recorder"
+MODULE = "uam_lab.records.recorder"
 TICK = 4_000_000
 SETPOINT = "/uam/setpoint"
 

@@ -7,7 +7,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from uam_control.coordinates import coordinates
-from uam_lab.recording.message_definitions import schema
+from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
 from uam_msgs_py.messages.convert import PoseWriter, read_joints
@@ -18,7 +18,7 @@ from uam_msgs_py.node.connections import READERS, Connections
 COORDINATES = coordinates(2)
 SIZE = len(COORDINATES)
 
-MODULE = "uam_lab.nodes.scene"
+MODULE = "uam_lab.cockpit.scene"
 TICK = 4_000_000  # [ns]
 # rows q_d, Omega_d, Omega_d_dot: what the position law desires
 ATTITUDE_DESIRED = np.array([[-0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.0]])

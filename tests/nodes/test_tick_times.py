@@ -7,7 +7,7 @@ import numpy as np
 
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.stamps import SECOND
-from uam_lab.budget.path import tick_path
+from uam_lab.experiments.budget.path import tick_path
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter

@@ -17,8 +17,8 @@ from std_srvs.srv import SetBool, Trigger
 from uam_control.coordinates import coordinates
 from uam_control.profiles.profile import NODES, load_profile, parameter_set
 from uam_control.settings import configuration
-from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
-from uam_lab.processes.guest import Guest
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import read_joints

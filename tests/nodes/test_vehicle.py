@@ -17,11 +17,11 @@ import yaml
 from arm_rig import BAUD, STOWED
 from autopilot_on_a_line import AutopilotOnALine
 
-from uam_lab.processes.process_table import nodes
-from uam_lab.vehicle.lab_file import template
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
-from uam_sim_bridge.emulation.mocap.mocap_server import MocapServer
-from uam_sim_bridge.emulation.mocap.tracked_body import TrackedBody
+from uam_lab.flights.processes.process_table import nodes
+from uam_lab.flights.vehicle.lab_file import template
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
+from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
 
 PATIENCE = 120.0  # [s]
 PLACE = np.array([0.0, 0.0, 0.2])

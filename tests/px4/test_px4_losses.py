@@ -7,8 +7,8 @@ import pytest
 from px4_at_hand import NO_PX4, installation
 from rate_steps import flown_by
 
-from uam_sim_bridge.mavlink.offboard.sequence import Phase
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
+from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
+from uam_control.offboard.sequence import Phase
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 
 AUTOPILOTS = [

@@ -6,9 +6,9 @@ from px4_at_hand import NO_PX4, installation
 from px4_pilot import KILL_SWITCH, Pilot
 
 from uam_control.coordinates import Z
+from uam_control.offboard.modes import Mode
 from uam_lab import CommandRefused, Flight
-from uam_lab.results import timeseries
-from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_lab.records.results import timeseries
 
 # the extra px4: it reads PX4's log, the record of what PX4 received
 pytest.importorskip("pyulog")

@@ -12,10 +12,10 @@ from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import metrics, result_folder
-from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.timeseries import FlightTable, gain_columns
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results import metrics, result_folder
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.results.timeseries import FlightTable, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from uam_sim_bridge.mavlink.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence, Request
-from uam_sim_bridge.mavlink.protocol.modes import MavResult
+from uam_control.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
+from uam_control.offboard.modes import MavResult
+from uam_control.offboard.sequence import OffboardParameters, OffboardSequence, Request
 from uam_sim_bridge.mavlink.telemetry.events import CHECKS, OTHERS
 
 TEXTS = [  # PX4 v1.16.0, STATUSTEXT

@@ -8,12 +8,12 @@ from pathlib import Path
 from uam_control import ages
 from uam_control.estimation import pose_filter
 from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.offboard.sequence import LINK_GAP
+from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.vehicle.loading import LONGEST_PERIOD
 from uam_sim_bridge.autopilot import autopilot_estimator
 from uam_sim_bridge.autopilot.commander import STREAM_GAP
-from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.sequence import LINK_GAP
 
 PERIOD = 0.004  # [s]
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from uam_control.settings.section import Section
 from uam_control.vehicle import load_description
-from uam_sim_bridge.drivers.dynamixel.budget import budget
-from uam_sim_bridge.drivers.dynamixel.chain import ArmError, describe_chain, hardware_file
-from uam_sim_bridge.drivers.dynamixel.friction import friction_torque
-from uam_sim_bridge.drivers.dynamixel.latency_timer import latency_timer
+from uam_sim_bridge.devices.dynamixel.budget import budget
+from uam_sim_bridge.devices.dynamixel.chain import ArmError, describe_chain, hardware_file
+from uam_sim_bridge.devices.dynamixel.friction import friction_torque
+from uam_sim_bridge.devices.dynamixel.latency_timer import latency_timer
 
 VEHICLE = load_description()
 SERVO = described().servos[0]

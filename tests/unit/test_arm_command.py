@@ -4,7 +4,7 @@ import pytest
 from arm_rig import BAUD, STOWED
 
 from uam_lab.cli.main import main
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
 
 
 @pytest.fixture

@@ -10,12 +10,12 @@ from arm_rig import BAUD, PATIENT, STOWED, ArmRig, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_sim_bridge.drivers.dynamixel.chain import ArmError
-from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
-from uam_sim_bridge.drivers.dynamixel.goals import goal_current, goal_position
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.chain import ArmError
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.goals import goal_current, goal_position
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost
 
 UNIT = 0.00269 * 1.304  # [N m] of one count of current
 

@@ -10,8 +10,8 @@ import yaml
 from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleError, load_description
-from uam_lab.flight import arm_on_ground
-from uam_lab.flight.flight_settings import settings
+from uam_lab.flights import arm_on_ground
+from uam_lab.flights.flight_settings import settings
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.arm_geometry import room_below
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from quadrotor import MASS, Quadrotor
 
+from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_multiply
+from uam_control.offboard.modes import FORCE, MavCmd, MavResult, Mode
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustMap
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import FORCE, MavCmd, MavResult, Mode
 
 OFFBOARD = (1.0, 6.0, 0.0)
 HOVER = MASS * 9.81 / (4 * 10.34)

@@ -23,7 +23,7 @@ from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReli
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from uam_lab.recording.bag import (
+from uam_lab.records.recording.bag import (
     METADATA,
     BagTopic,
     add_topic,
@@ -31,7 +31,7 @@ from uam_lab.recording.bag import (
     offered_qos,
     write_metadata,
 )
-from uam_lab.recording.bounded_log import BoundedLog
+from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.messages.transforms import Transform, transforms_message

@@ -3,17 +3,17 @@
 import pytest
 import yaml
 
+from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
+from uam_control.offboard.sequence import OffboardParameters
+from uam_control.setpoints.kinds.catalogue import SetpointParameters
+from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.vehicle import derived_parameters, load_description
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnetParameters
-from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
-from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
+from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
 from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, differences, expected
 
 BRIDGE = yaml.safe_load(path("bridge/bridge.yaml").read_text())["mavlink_bridge"]["ros__parameters"]

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 pytest.importorskip("rclpy")
 
-from uam_lab.budget import flown, report
-from uam_lab.budget.flown import Budget, CoreShares
-from uam_lab.budget.path import SEGMENTS, NoTicks, tick_path, work
-from uam_lab.budget.shuttle import shuttle
 from uam_lab.cli.main import main
-from uam_lab.flight.observer import Observer
-from uam_lab.processes.interrupts import INTERRUPTED
+from uam_lab.experiments.budget import flown, report
+from uam_lab.experiments.budget.flown import Budget, CoreShares
+from uam_lab.experiments.budget.path import SEGMENTS, NoTicks, tick_path, work
+from uam_lab.experiments.budget.shuttle import shuttle
+from uam_lab.flights.observer import Observer
+from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_msgs_py.node.tick_times import COLUMNS, PARTS
 
 MS = 1_000_000  # [ns]

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_lab.campaign.campaign_report import _with_band
-from uam_lab.campaign.statistics import BINS, percentile, share, sliced
-from uam_lab.results.templates import render
+from uam_lab.experiments.campaign.campaign_report import _with_band
+from uam_lab.experiments.campaign.statistics import BINS, percentile, share, sliced
+from uam_lab.records.results.templates import render
 
 
 def test_the_band_of_a_share_is_wilsons():
@@ -53,7 +53,9 @@ def test_the_page_says_how_many_flights_a_step_has():
     slices = {"wind": sliced(values, values > 40.0, values)}  # two bins: 23 and 22
     lists = dict.fromkeys(("heads", "percentiles", "worst", "outcomes"), [])
     texts = dict.fromkeys(("vehicle", "sentence", "picture", "command"), "x")
-    page = render("uam_lab.campaign", "campaign.html.j2", slices=slices, **lists, **texts)
+    page = render(
+        "uam_lab.experiments.campaign", "campaign.html.j2", slices=slices, **lists, **texts
+    )
     assert "Each step is 22 or 23 of 45 flights." in page
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_lab.recording import cdr
+from uam_lab.records.recording import cdr
 
 serialization = pytest.importorskip("rclpy.serialization")
 serialize = serialization.serialize_message

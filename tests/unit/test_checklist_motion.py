@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector
-from uam_lab.checklist.checklist import Checklist
-from uam_lab.checklist.finding import Finding
-from uam_lab.checklist.guided import guided
-from uam_lab.checklist.limits import ChecklistParameters
-from uam_lab.checklist.motion_step import MotionStep
-from uam_lab.checklist.samples import Window
-from uam_lab.checklist.step import Situation, StepState
+from uam_lab.preflight.checklist.checklist import Checklist
+from uam_lab.preflight.checklist.finding import Finding
+from uam_lab.preflight.checklist.guided import guided
+from uam_lab.preflight.checklist.limits import ChecklistParameters
+from uam_lab.preflight.checklist.motion_step import MotionStep
+from uam_lab.preflight.checklist.samples import Window
+from uam_lab.preflight.checklist.step import Situation, StepState
 
 LIMITS = ChecklistParameters()
 JOINTS = ("alpha_1", "alpha_2")

@@ -12,7 +12,7 @@ from pid_law import PidLaw
 
 from uam_control.laws import catalogue
 from uam_lab.cli.parser import parser
-from uam_lab.compare import plan
+from uam_lab.experiments.compare import plan
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs/commands.md").read_text()

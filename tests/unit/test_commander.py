@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.battery import ChargeState, SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
 CENTRED, PUSHED = (0.0, 0.0, 0.0, 0.0), (0.31, 0.0, 0.0, 0.0)  # COM_RC_STICK_OV is 30 %
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
+from uam_control.frames import swap_quaternion, swap_world
+from uam_control.offboard.modes import MavCmd, MavResult, Mode
+from uam_control.setpoints.vision_pose import VisionPose
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose, covariance
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import covariance, vision_message
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text
 
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -155,7 +156,7 @@ def test_vision_reaches_the_estimate(odometry):
         if odometry:
             rig.send(odometry_message(rig.time, position, q))
         else:
-            rig.send(VisionPose(rig.time, position, q, 0.01, 0.01).message())
+            rig.send(vision_message(VisionPose(rig.time, position, q, 0.01, 0.01)))
         rig.tick()
     rig.send(
         mavlink2.MAVLink_command_long_message(
@@ -201,7 +202,7 @@ def test_mutated_messages_never_change_flight_into_nonsense():
         mavlink2.MAVLink_set_mode_message(1, 1, 0x60000),
         mavlink2.MAVLink_param_set_message(1, 1, b"MC_ROLLRATE_P", 0.2, 9),
         mavlink2.MAVLink_param_request_read_message(1, 1, b"THR_MDL_FAC", -1),
-        VisionPose(0.0, np.zeros(3), LEVEL, 0.01, 0.01).message(),
+        vision_message(VisionPose(0.0, np.zeros(3), LEVEL, 0.01, 0.01)),
         odometry_message(0.0, np.zeros(3), LEVEL),
         mavlink2.MAVLink_timesync_message(0, 1),
     ]

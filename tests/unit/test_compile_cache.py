@@ -9,8 +9,8 @@ import numba
 import pytest
 from fresh_process import FreshProcess
 
-from uam_lab.flight.direct import warm_up
-from uam_lab.flight.ros import node_arguments as ros_nodes
+from uam_lab.flights.direct import warm_up
+from uam_lab.flights.ros import node_arguments as ros_nodes
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="NUMBA_DISABLE_JIT: nothing is compiled"
@@ -188,8 +188,8 @@ def test_a_warm_up_leaves_nothing_of_the_nodes_to_compile():
 LATE_FLIGHT = """
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
-from uam_lab.flight.direct import warm_up
-from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flights.direct import warm_up
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

@@ -16,7 +16,7 @@ import json, sys
 if {without_numba}: sys.modules["numba"] = None  # as if it were not installed
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 sets = load_scenario("pick_and_place"), load_profile({profile!r}), Vehicle.load()
 flight = DirectFlight(*sets, 0.2, 1)

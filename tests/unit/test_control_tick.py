@@ -9,13 +9,13 @@ import pytest
 
 from uam_control.coordinates import ARM
 from uam_control.mission import load_scenario
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence, Reported, Request
 from uam_control.profiles.profile import load_profile
+from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
+from uam_control.stages.control_tick import STAGES, ControlTick
 from uam_control.stages.timing import Timing
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Reported, Request
-from uam_sim_bridge.mavlink.protocol.modes import Mode
-from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
-from uam_sim_bridge.stages.control_tick import STAGES, ControlTick
 
 PERIOD = 4_000_000  # [ns]
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from uam_lab.recording import core_offers
-from uam_lab.recording.core_offers import AT_ONCE, LONG, CoreOffers
+from uam_lab.records.recording import core_offers
+from uam_lab.records.recording.core_offers import AT_ONCE, LONG, CoreOffers
 
 
 @pytest.fixture

@@ -15,13 +15,13 @@ from arm_rig import BAUD, STOWED
 
 from uam_lab.cli import doctor as command
 from uam_lab.cli.main import main
-from uam_lab.doctor import devices, installation, run
-from uam_lab.doctor.check_process import TOO_LATE, CheckProcess
-from uam_lab.doctor.finding import Verdict, fail, ok, warn
-from uam_lab.vehicle.lab_file import load_lab
-from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
+from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.preflight.doctor import devices, installation, run
+from uam_lab.preflight.doctor.check_process import TOO_LATE, CheckProcess
+from uam_lab.preflight.doctor.finding import Verdict, fail, ok, warn
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 
 OK, WARN, FAIL = Verdict
 

@@ -6,9 +6,9 @@ import threading
 
 import pytest
 
-from uam_lab.doctor import autopilot
-from uam_lab.doctor.finding import Verdict
-from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_control.offboard.modes import Mode
+from uam_lab.preflight.doctor import autopilot
+from uam_lab.preflight.doctor.finding import Verdict
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.px4.px4_installation import VARIABLE

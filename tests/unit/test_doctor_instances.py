@@ -5,9 +5,9 @@ import socket
 
 import pytest
 
-from uam_lab.doctor import instances, leftovers
-from uam_lab.doctor.finding import Verdict
-from uam_lab.processes import process_table
+from uam_lab.flights.processes import process_table
+from uam_lab.preflight.doctor import instances, leftovers
+from uam_lab.preflight.doctor.finding import Verdict
 from uam_sim_bridge.ports import INSTANCES, Reservation
 
 OK, WARN, FAIL = Verdict

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.doctor import machine, rendering
-from uam_lab.doctor.check_process import TOO_LATE, Said
-from uam_lab.doctor.finding import Verdict
-from uam_lab.flight.observer import Observer
-from uam_lab.flight.ros import supervise
-from uam_lab.processes import shared_memory
+from uam_lab.flights.observer import Observer
+from uam_lab.flights.processes import shared_memory
+from uam_lab.flights.ros import supervise
+from uam_lab.preflight.doctor import machine, rendering
+from uam_lab.preflight.doctor.check_process import TOO_LATE, Said
+from uam_lab.preflight.doctor.finding import Verdict
 
 OK, WARN, FAIL = Verdict
 

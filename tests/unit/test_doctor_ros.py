@@ -3,9 +3,9 @@
 import pytest
 
 from uam_control.settings import configuration
-from uam_lab.doctor import environment, ros
-from uam_lab.doctor.check_process import Said
-from uam_lab.doctor.finding import Verdict
+from uam_lab.preflight.doctor import environment, ros
+from uam_lab.preflight.doctor.check_process import Said
+from uam_lab.preflight.doctor.finding import Verdict
 from uam_sim_bridge.ports import Reservation
 
 OK, WARN, FAIL = Verdict

@@ -11,21 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from set_clock import SetClock
 
-from uam_sim_bridge.drivers.dynamixel.control_table import (
+from uam_sim_bridge.devices.dynamixel.control_table import (
     ControlTableError,
     control_table,
     model_numbers,
     signed,
     unsigned,
 )
-from uam_sim_bridge.drivers.dynamixel.hardware_errors import (
-    ERROR_BITS,
-    advice,
-    hardware_errors,
-)
-from uam_sim_bridge.drivers.dynamixel.port import PatientPort
-from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost, NoAnswer, Refused, ServoBus
-from uam_sim_bridge.emulation.dynamixel import (
+from uam_sim_bridge.devices.dynamixel.emulated import (
     ArmShafts,
     Drive,
     EmulatedBus,
@@ -34,6 +27,13 @@ from uam_sim_bridge.emulation.dynamixel import (
     ServoLine,
     StillShaft,
 )
+from uam_sim_bridge.devices.dynamixel.hardware_errors import (
+    ERROR_BITS,
+    advice,
+    hardware_errors,
+)
+from uam_sim_bridge.devices.dynamixel.port import PatientPort
+from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost, NoAnswer, Refused, ServoBus
 
 TABLE = control_table("xm430_w210")
 TORQUE, MODE, CURRENT = TABLE["Torque Enable"], TABLE["Operating Mode"], TABLE["Goal Current"]

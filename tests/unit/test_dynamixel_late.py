@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from set_clock import SetClock
 
-from uam_sim_bridge.drivers.dynamixel.control_table import control_table
-from uam_sim_bridge.drivers.dynamixel.overdue import LATEST, Instruction, Overdue
-from uam_sim_bridge.drivers.dynamixel.servo_bus import NoAnswer, ServoBus
-from uam_sim_bridge.emulation.dynamixel import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.control_table import control_table
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.overdue import LATEST, Instruction, Overdue
+from uam_sim_bridge.devices.dynamixel.servo_bus import NoAnswer, ServoBus
 
 TABLE = control_table("xm430_w210")
 # of one byte, two and four: each with another content

@@ -5,10 +5,10 @@ from dynamixel_sdk import COMM_SUCCESS, Protocol2PacketHandler
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.drivers.dynamixel.packet_handler import StuffingPacketHandler
-from uam_sim_bridge.drivers.dynamixel.port import PatientPort
-from uam_sim_bridge.emulation.dynamixel import packets
-from uam_sim_bridge.emulation.dynamixel.packets import Packet, PacketReader, crc16
+from uam_sim_bridge.devices.dynamixel.emulated import packets
+from uam_sim_bridge.devices.dynamixel.emulated.packets import Packet, PacketReader, crc16
+from uam_sim_bridge.devices.dynamixel.packet_handler import StuffingPacketHandler
+from uam_sim_bridge.devices.dynamixel.port import PatientPort
 
 SDK = StuffingPacketHandler()  # as the driver uses it
 PLAIN = Protocol2PacketHandler()  # as delivered

@@ -6,12 +6,12 @@ import pytest
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_lab.campaign.trial import Trial
 from uam_lab.cli.main import main
-from uam_lab.results import row_table
-from uam_lab.results.row_table import RowTableError
-from uam_lab.study import kept
-from uam_lab.study.flights import StudyFlight
+from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.study import kept
+from uam_lab.experiments.study.flights import StudyFlight
+from uam_lab.records.results import row_table
+from uam_lab.records.results.row_table import RowTableError
 
 FOREIGN = {
     "--vehicle": "s500_arm",

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from uam_sim_bridge.mavlink.protocol.modes import Severity
+from uam_control.offboard.modes import Severity
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 from uam_sim_bridge.mavlink.telemetry.event_messages import (
     EventMessage,

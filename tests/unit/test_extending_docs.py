@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from uam_control.setpoints.kinds.desired import Desired, level
 from uam_sim_bridge.faults import imu_faults
 from uam_sim_bridge.faults.fault import Occurrence
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
 from uam_sim_bridge.plant import Samples
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/extending.md").read_text()

@@ -10,15 +10,15 @@ import pytest
 from default_columns import COLUMNS
 
 from uam_control.settings import configuration
-from uam_lab.campaign import fault_matrix, fault_report
-from uam_lab.campaign.fault_outcome import OUTCOMES, classify, down_after, explained
-from uam_lab.campaign.fault_trial import FaultResult
 from uam_lab.cli.main import main
+from uam_lab.experiments.campaign import fault_matrix, fault_report
+from uam_lab.experiments.campaign.fault_outcome import OUTCOMES, classify, down_after, explained
+from uam_lab.experiments.campaign.fault_trial import FaultResult
+from uam_lab.records.results import metrics
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
-from uam_lab.results import metrics
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError
 
 MATRIX = configuration.path("campaign/faults.yaml")
@@ -30,7 +30,7 @@ def record(begin, end, name="motor_loss", **values):
 
 def test_an_event_is_read_back_from_its_message_and_a_log():
     pytest.importorskip("rclpy")
-    from uam_lab.recording import fault_records as fault_log
+    from uam_lab.records.recording import fault_records as fault_log
     from uam_msgs_py.messages.fault_events import FaultEvent
 
     first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})

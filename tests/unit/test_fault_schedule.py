@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import Bound, Choice
-from uam_lab.processes import thread_stop
+from uam_lab.flights.processes import thread_stop
 from uam_sim_bridge.faults import (
     CABLE,
     FAULTS,

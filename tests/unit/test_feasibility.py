@@ -22,7 +22,7 @@ from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.supervision import Readings
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.arm_model import ArmModel
-from uam_lab.flight.flight_settings import settings as flight_settings
+from uam_lab.flights.flight_settings import settings as flight_settings
 from uam_sim_bridge.plant import Vehicle
 
 PROFILE = load_profile("s500")

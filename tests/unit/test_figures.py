@@ -7,10 +7,10 @@ from PIL import Image
 
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import analyse
+from uam_lab.records.results import metrics
+from uam_lab.records.results.timeseries import Series, gain_columns
 from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.results import metrics
-from uam_lab.results.timeseries import Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 

@@ -4,14 +4,14 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from uam_lab.flight import flight_settings
-from uam_lab.flight.flight_settings import SettingsError
-from uam_lab.flight.ros import node_arguments
-from uam_lab.results.result_folder import ResultFolder
+from uam_control.stages.control_tick import STAGES
+from uam_lab.flights import flight_settings
+from uam_lab.flights.flight_settings import SettingsError
+from uam_lab.flights.ros import node_arguments
+from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.tick_times import NoTickTimes
 from uam_sim_bridge.nodes import flight_controller
-from uam_sim_bridge.stages.control_tick import STAGES
 
 
 def test_every_stage_of_the_tick_has_its_node():

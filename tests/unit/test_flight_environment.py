@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.flight import flight_settings
-from uam_lab.processes import middleware, node_environment
+from uam_lab.flights import flight_settings
+from uam_lab.flights.processes import middleware, node_environment
 
 
 def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
@@ -112,7 +112,7 @@ def test_a_middleware_that_is_not_installed_is_named_before_ros_ends_the_process
 )
 def test_what_keeps_ros_from_starting_is_an_error_of_the_user(surroundings, arguments, complaint):
     pytest.importorskip("rclpy")
-    from uam_lab.processes.guest import Guest
+    from uam_lab.flights.processes.guest import Guest
 
     with pytest.raises(ConfigurationError) as refused:
         Guest("uam_test", {"ROS_SECURITY_ENABLE": "", **surroundings}, arguments=arguments)

@@ -5,15 +5,15 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.mavlink.link.flight_state import SETTLING, FlightState
-from uam_sim_bridge.mavlink.offboard.sequence import (
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import (
     OffboardParameters,
     OffboardSequence,
     Phase,
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.link.flight_state import SETTLING, FlightState
 
 TICK = 0.004  # [s]
 

@@ -9,10 +9,10 @@ from rich.table import Table
 
 import uam_lab
 from uam_control.settings.visible_text import visible
+from uam_lab.records.results.templates import markdown_table
+from uam_lab.records.results.terminal import Terminal, say
 from uam_lab.report.figures import style
 from uam_lab.report.page.console import reporting
-from uam_lab.results.templates import markdown_table
-from uam_lab.results.terminal import Terminal, say
 
 HOSTILE = ("[mm]", "[/x]", "[red]x[/red]", ":smile:", "[link=http://a]b[/link]")
 

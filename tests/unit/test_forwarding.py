@@ -7,12 +7,12 @@ import time
 import numpy as np
 import pytest
 
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence, Request
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.forwarding import GroundStation

@@ -8,12 +8,12 @@ import fuzz_mavlink
 import numpy as np
 import pytest
 
+from uam_control.offboard.sequence import OffboardSequence
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, _frame_end, checksum_fits, mavlink2
 
 

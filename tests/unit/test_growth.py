@@ -11,7 +11,7 @@ from uam_control.coordinates import ARM, POSITION
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
-from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.plant import Vehicle
 

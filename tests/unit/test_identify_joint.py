@@ -15,7 +15,8 @@ from uam_control.vehicle import load_description
 from uam_control.vehicle.arm_model import ArmModel
 from uam_lab.cli import identify_joint
 from uam_lab.cli.main import main
-from uam_sim_bridge.drivers.dynamixel.excitation import (
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, FrictionShaft
+from uam_sim_bridge.devices.dynamixel.excitation import (
     Aborted,
     Excitation,
     ExcitationParameters,
@@ -23,8 +24,7 @@ from uam_sim_bridge.drivers.dynamixel.excitation import (
     centre_of,
     excite,
 )
-from uam_sim_bridge.drivers.dynamixel.friction_fit import FitError, fit_friction
-from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, FrictionShaft
+from uam_sim_bridge.devices.dynamixel.friction_fit import FitError, fit_friction
 
 NOMINAL = 1.304  # [N m/A] torque_per_current of the vehicle
 SHORT = ExcitationParameters(duration=12.0, approach=1.0)

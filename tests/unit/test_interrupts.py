@@ -12,8 +12,8 @@ import pytest
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from uam_lab.processes import child
-from uam_lab.processes.interrupts import Interrupts
+from uam_lab.flights.processes import child
+from uam_lab.flights.processes.interrupts import Interrupts
 from multiprocessing import forkserver
 
 child.prepare([])

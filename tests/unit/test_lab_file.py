@@ -13,18 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.settings import configuration
-from uam_lab.results.result_folder import ResultFolder
-from uam_lab.vehicle.lab import LabError, Room
-from uam_lab.vehicle.lab_file import REQUIRED, load_lab, template
-from uam_lab.vehicle.lab_settings import settings_of
-from uam_lab.vehicle.vehicle_nodes import parameters
-from uam_sim_bridge.drivers.dynamixel.chain import ArmError
-from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters
-from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
-from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
-from uam_sim_bridge.emulation.dynamixel import EmulatedServo, ServoLine, StillShaft
+from uam_lab.flights.vehicle.lab import LabError, Room
+from uam_lab.flights.vehicle.lab_file import REQUIRED, load_lab, template
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.vehicle_nodes import parameters
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_sim_bridge.devices.dynamixel.chain import ArmError
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.devices.magnet.magnet_driver import LineParameters
+from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
+from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 
 MISSING = object()
 GRIPPER = {"through": "autopilot", "magnet": "gripper", "magnet_output": 2}

@@ -3,7 +3,7 @@
 import pytest
 from layout_targets.targets import CORES, MISSED, P50, PACE, Value, table
 
-from uam_lab.budget.flown import LAYOUTS
+from uam_lab.experiments.budget.flown import LAYOUTS
 
 
 @pytest.mark.parametrize(

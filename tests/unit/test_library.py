@@ -5,11 +5,11 @@ import pytest
 
 from uam_control.settings.parameter_file import ProfileError
 from uam_lab import Flight, FlightError, NotInTime
-from uam_lab.flight.flight_settings import SettingsError
-from uam_lab.flight.observer import FlightStatus, Observer
-from uam_lab.flight.ros import node_arguments
-from uam_lab.library.history import KEPT, History
-from uam_lab.results.result_folder import ResultFolderError
+from uam_lab.flights.flight_settings import SettingsError
+from uam_lab.flights.library.history import KEPT, History
+from uam_lab.flights.observer import FlightStatus, Observer
+from uam_lab.flights.ros import node_arguments
+from uam_lab.records.results.result_folder import ResultFolderError
 from uam_sim_bridge.faults import FaultError
 
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from memory_transport import Memory
 
+from uam_control.offboard.modes import MavCmd, MavResult, Mode
+from uam_control.offboard.sequence import (
+    OffboardParameters,
+    OffboardSequence,
+    Phase,
+)
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.link.link import UNSIGNED, OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
-from uam_sim_bridge.mavlink.offboard.sequence import (
-    OffboardParameters,
-    OffboardSequence,
-    Phase,
-)
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage

@@ -17,12 +17,12 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
-from uam_lab.recording import cdr, log_reader
-from uam_lab.recording.bounded_log import BoundedLog
-from uam_lab.recording.logged_topics import ADAPTATION, Log
-from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog
-from uam_lab.recording.message_definitions import schema
-from uam_lab.results.timeseries import gain_columns
+from uam_lab.records.recording import cdr, log_reader
+from uam_lab.records.recording.bounded_log import BoundedLog
+from uam_lab.records.recording.logged_topics import ADAPTATION, Log
+from uam_lab.records.recording.mcap_reader import TopicLog, UnreadableLog
+from uam_lab.records.recording.message_definitions import schema
+from uam_lab.records.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.parameter_changes import ParameterChange

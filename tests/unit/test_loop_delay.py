@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from uam_control.setpoints.loop_delay import DELAYS, LoopDelay
 from uam_control.supervision import Readings, SupervisionParameters
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger, margin_left
-from uam_sim_bridge.mavlink.offboard.loop_delay import DELAYS, LoopDelay
 
 PERIOD, LAG = 0.004, 0.017
 

@@ -10,18 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memory_transport import Memory
 
-from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import load_description
-from uam_sim_bridge.autopilot.companion import Companion
-from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.server import CONTROLS, Server
-from uam_sim_bridge.drivers.magnet import gpio_line
-from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, MagnetError
-from uam_sim_bridge.drivers.magnet.magnet_driver import MagnetDriver
-from uam_sim_bridge.drivers.magnet.switching import MagnetSwitching, SwitchingParameters
-from uam_sim_bridge.emulation.gpio.file_line import FileLine
-from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import (
+from uam_control.offboard.autopilot_magnet import (
     LATEST,
     PROGRESS_REPEAT,
     REFUSED_REPEAT,
@@ -30,9 +19,20 @@ from uam_sim_bridge.mavlink.offboard.autopilot_magnet import (
     AutopilotMagnet,
     AutopilotMagnetParameters,
 )
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult
+from uam_control.offboard.modes import MavCmd, MavResult
+from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
+from uam_sim_bridge.autopilot.companion import Companion
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.server import CONTROLS, Server
+from uam_sim_bridge.devices.magnet import gpio_line
+from uam_sim_bridge.devices.magnet.file_line import FileLine
+from uam_sim_bridge.devices.magnet.gpio_line import GpioLine, MagnetError
+from uam_sim_bridge.devices.magnet.magnet_driver import MagnetDriver
+from uam_sim_bridge.devices.magnet.switching import MagnetSwitching, SwitchingParameters
+from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 ACTUATOR = AutopilotMagnetParameters(magnet="actuator", magnet_output=2)

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-
-from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
 from uam_sim_bridge.mavlink.offboard import autopilot_magnet
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnetParameters
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd
+
+from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
+from uam_control.offboard.modes import MavCmd
+from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/magnet_hardware.md").read_text()
 

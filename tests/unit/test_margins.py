@@ -12,12 +12,12 @@ from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
 from uam_lab.cli.margins import verdict
-from uam_lab.margins.linear import IN, LinearBlock, delay, join, linearise
-from uam_lab.margins.loops import analyse, step_response
-from uam_lab.margins.margins import common_delay, margins
-from uam_lab.margins.plant_model import plant_model, rotor_model, zero_order_hold
-from uam_lab.margins.pose_delay import pose_delay, remaining
-from uam_lab.margins.stack_model import stack_model
+from uam_lab.experiments.margins.linear import IN, LinearBlock, delay, join, linearise
+from uam_lab.experiments.margins.loops import analyse, step_response
+from uam_lab.experiments.margins.margins import common_delay, margins
+from uam_lab.experiments.margins.plant_model import plant_model, rotor_model, zero_order_hold
+from uam_lab.experiments.margins.pose_delay import pose_delay, remaining
+from uam_lab.experiments.margins.stack_model import stack_model
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors
 
@@ -248,7 +248,7 @@ def test_a_prediction_gives_roll_and_pitch_phase_and_leaves_yaw(vehicle):
 
 
 def test_an_unwritable_folder_is_refused_before_the_flight(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("uam_lab.margins.gains.fly", lambda *_: pytest.fail("flown"))
+    monkeypatch.setattr("uam_lab.experiments.margins.gains.fly", lambda *_: pytest.fail("flown"))
     (tmp_path / "file").touch()
     assert main(["margins", "--out", str(tmp_path / "file" / "out")]) == 2
     assert "cannot be written" in capsys.readouterr().err

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from default_columns import COLUMNS
 
-from uam_lab.results import metrics
-from uam_lab.results.timeseries import FlightTable
+from uam_lab.records.results import metrics
+from uam_lab.records.results.timeseries import FlightTable
 
 INFO = {
     "controller": "modular",

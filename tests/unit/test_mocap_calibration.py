@@ -16,13 +16,13 @@ from uam_control.maths.rotations import (
     quaternion_multiply,
 )
 from uam_lab.cli.main import main
-from uam_sim_bridge.drivers.mocap import calibration as calibrations
-from uam_sim_bridge.drivers.mocap import live, raw_log
-from uam_sim_bridge.drivers.mocap.fit import fit
-from uam_sim_bridge.drivers.mocap.frame import BodyPose, MocapError
-from uam_sim_bridge.drivers.mocap.measurement import angle_between, places, still
-from uam_sim_bridge.emulation.mocap.mocap_server import MocapServer
-from uam_sim_bridge.emulation.mocap.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap import calibration as calibrations
+from uam_sim_bridge.devices.mocap import live, raw_log
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
+from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.fit import fit
+from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
+from uam_sim_bridge.devices.mocap.measurement import angle_between, places, still
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import standing_height
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_sim_bridge.drivers.mocap.clock_offset import DRIFT_MAX, ClockOffset
-from uam_sim_bridge.drivers.mocap.frame_count import RESTART, FrameCount
+from uam_sim_bridge.devices.mocap.clock_offset import DRIFT_MAX, ClockOffset
+from uam_sim_bridge.devices.mocap.frame_count import RESTART, FrameCount
 
 RATE = 120.0
 

@@ -14,10 +14,10 @@ from uam_control.maths.rotations import (
     quaternion_multiply,
 )
 from uam_control.settings.configuration import ConfigurationError
-from uam_sim_bridge.drivers.mocap import calibration as calibrations
-from uam_sim_bridge.drivers.mocap.calibration import Calibration, conjugate, world_rotation
-from uam_sim_bridge.drivers.mocap.frame import BodyPose, MocapError
-from uam_sim_bridge.emulation.mocap.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap import calibration as calibrations
+from uam_sim_bridge.devices.mocap.calibration import Calibration, conjugate, world_rotation
+from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 
 HALF = math.sqrt(0.5)
 Y_UP = calibrations.load("motive_y_up")

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from natnet.version import Version
 
-from uam_sim_bridge.drivers.mocap.calibration import load
-from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
-from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
-from uam_sim_bridge.drivers.mocap.natnet_reader import UNREADABLE, read_frame, read_models
-from uam_sim_bridge.drivers.mocap.natnet_source import NatNetSource
-from uam_sim_bridge.emulation.mocap import natnet_packets as packets
-from uam_sim_bridge.emulation.mocap.mocap_server import MocapServer
-from uam_sim_bridge.emulation.mocap.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.calibration import load
+from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
+from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
+from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
+from uam_sim_bridge.devices.mocap.natnet_reader import UNREADABLE, read_frame, read_models
+from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource
 
 PATIENCE = 60.0  # [s]
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from uam_sim_bridge.drivers.mocap import fit, measurement
-from uam_sim_bridge.drivers.mocap.calibration import ENTRIES
-from uam_sim_bridge.drivers.mocap.library_source import SYSTEMS
+from uam_sim_bridge.devices.mocap import fit, measurement
+from uam_sim_bridge.devices.mocap.calibration import ENTRIES
+from uam_sim_bridge.devices.mocap.library_source import SYSTEMS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/mocap_hardware.md").read_text()

@@ -18,18 +18,18 @@ from natnet.packet_buffer import PacketBuffer
 from natnet.version import Version
 
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_sim_bridge.drivers.mocap import calibration as calibrations
-from uam_sim_bridge.drivers.mocap import driver as driver_module
-from uam_sim_bridge.drivers.mocap import natnet_messages
-from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
-from uam_sim_bridge.drivers.mocap.frame import BodyPose, Frame, MocapError
-from uam_sim_bridge.drivers.mocap.library_source import LibrarySource
-from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
-from uam_sim_bridge.drivers.mocap.natnet_source import NatNetSource
-from uam_sim_bridge.emulation.mocap import natnet_packets as packets
-from uam_sim_bridge.emulation.mocap.mocap_server import Disturbances, MocapServer
-from uam_sim_bridge.emulation.mocap.plant_poses import poses_of
-from uam_sim_bridge.emulation.mocap.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap import calibration as calibrations
+from uam_sim_bridge.devices.mocap import driver as driver_module
+from uam_sim_bridge.devices.mocap import natnet_messages
+from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
+from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer
+from uam_sim_bridge.devices.mocap.emulated.plant_poses import poses_of
+from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
+from uam_sim_bridge.devices.mocap.library_source import LibrarySource
+from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
+from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -374,7 +374,7 @@ def test_the_process_of_the_library_prints_one_line_per_frame():
             "interface_ip": "127.0.0.1",
             "port_command": str(server.port),
         }
-        command = [sys.executable, "-m", "uam_sim_bridge.drivers.mocap.library_process"]
+        command = [sys.executable, "-m", "uam_sim_bridge.devices.mocap.library_process"]
         process = subprocess.Popen(
             [*command, "optitrack", json.dumps(options)], stdout=subprocess.PIPE, env=os.environ
         )

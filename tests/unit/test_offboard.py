@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.offboard.sequence import (
+from uam_control.offboard.modes import MavResult, Mode, Severity
+from uam_control.offboard.sequence import (
     COMMANDS,
     OffboardParameters,
     OffboardSequence,
@@ -11,8 +11,8 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_sim_bridge.autopilot.core import Autopilot
 
 DOWN = np.array([0.0, 0.0, -9.81])
 

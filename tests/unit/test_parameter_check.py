@@ -5,9 +5,9 @@ import struct
 
 import pytest
 
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.telemetry.parameter_check import (
     adopted,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import load_description
-from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from uam_control.settings.process_parameters import ProcessParameters
-from uam_lab.flight.flight_settings import AUTOPILOT, BUILTIN
-from uam_lab.flight.ros.placement import NICE, pair, placing
+from uam_lab.flights.flight_settings import AUTOPILOT, BUILTIN
+from uam_lab.flights.ros.placement import NICE, pair, placing
 from uam_msgs_py.node import wiring
 
 

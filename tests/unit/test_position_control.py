@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from uam_control.ages import age_by
+from uam_control.setpoints.kinds.desired import Desired, level
+from uam_control.setpoints.kinds.position import position_setpoint
+from uam_control.setpoints.position_target import FLOWN_MASKS, PositionTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion
@@ -16,9 +19,7 @@ from uam_sim_bridge.autopilot.loops.position_control import (
     limit_across,
 )
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
-from uam_sim_bridge.mavlink.offboard.setpoints.position import position_setpoint
-from uam_sim_bridge.mavlink.protocol.position_target import FLOWN_MASKS, PositionTarget
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import position_target, setpoint_message
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 LEVEL = np.array([1.0, 0, 0, 0])
@@ -61,7 +62,7 @@ def test_without_a_reference_attitude_and_thrust_are_sent():
 @pytest.mark.parametrize("mask", FLOWN_MASKS)
 def test_a_message_carries_it_and_ignored_values_are_zero(mask):
     given = target((1, 2, -3), (0.5, 0, 0), (0, 0.25, 0), 0.5, mask)
-    back = PositionTarget.from_message(given.message(1.0, 1))
+    back = position_target(setpoint_message(given, 1.0, 1))
     assert not back.refused() and back.yaw == 0.5
     np.testing.assert_array_equal(back.position, given.position)
     np.testing.assert_array_equal(back.velocity, 0.0 if mask & 0x38 else given.velocity)
@@ -171,7 +172,7 @@ def armed():
         time = 0.004 * k
         if k % 5 == 0:
             autopilot.vision(time, np.zeros(3), LEVEL)
-        companion.handle(time, target((0, 0, -1)).message(time, 1))
+        companion.handle(time, setpoint_message(target((0, 0, -1)), time, 1))
         if k == 300:
             autopilot.command(time, 176, (1.0, 6.0, 0.0))
             autopilot.command(time, 400, (1.0, 0.0))
@@ -183,7 +184,7 @@ def test_the_stand_in_flies_position_setpoints_in_offboard():
     autopilot, companion = armed()
     assert autopilot.commander.armed
     assert autopilot.motors.min() > 0.55  # it climbs to 1 m
-    wrong = target().message(2.0, 1)
+    wrong = setpoint_message(target(), 2.0, 1)
     wrong.coordinate_frame = mavlink2.MAV_FRAME_BODY_NED
     companion.handle(2.0, wrong)
     texts = [text for _, text in autopilot.commander.take_texts()]

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_lab.checklist.automatic import automatic
-from uam_lab.checklist.guided import JOINT, guided
-from uam_lab.checklist.limits import ChecklistParameters, MotionLimits
-from uam_lab.checklist.observation import Box, Observation
-from uam_lab.nodes.checklist import ChecklistOptions
+from uam_lab.preflight.checklist.automatic import automatic
+from uam_lab.preflight.checklist.guided import JOINT, guided
+from uam_lab.preflight.checklist.limits import ChecklistParameters, MotionLimits
+from uam_lab.preflight.checklist.observation import Box, Observation
+from uam_lab.preflight.checklist_node import ChecklistOptions
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/preflight.md").read_text()
 

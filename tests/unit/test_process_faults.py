@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from uam_control.mission import load_scenario
-from uam_lab.flight.ros.process_fault_injection import ProcessFaults
-from uam_lab.processes.processes import Processes
+from uam_lab.flights.processes.processes import Processes
+from uam_lab.flights.ros.process_fault_injection import ProcessFaults
 from uam_sim_bridge.faults import read_schedule
 
 SLEEPER = """

@@ -13,7 +13,7 @@ pytest.importorskip("rclpy")
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters, cores_of
-from uam_lab.flight.flight_settings import SettingsError, settings
+from uam_lab.flights.flight_settings import SettingsError, settings
 from uam_msgs_py.node import process_options
 
 # as a user without privileges, with the usual limits

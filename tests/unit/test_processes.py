@@ -9,8 +9,8 @@ import time
 import psutil
 import pytest
 
-from uam_lab.processes import process_table, processes
-from uam_lab.processes.processes import NodeFailed, Processes
+from uam_lab.flights.processes import process_table, processes
+from uam_lab.flights.processes.processes import NodeFailed, Processes
 
 SLEEPER = """
 import signal, sys, time
@@ -198,7 +198,7 @@ def test_no_child_survives_a_killed_orchestrator(tmp_path, stopped):
     path = os.pathsep.join([str(tmp_path), *sys.path])
     program = f"""
 import os, pathlib, sys, time
-from uam_lab.processes.processes import Processes
+from uam_lab.flights.processes.processes import Processes
 folder = pathlib.Path({str(tmp_path)!r})
 children = Processes(folder, {{**os.environ, "PYTHONPATH": {path!r}}})
 children.start("a", "sleeper")

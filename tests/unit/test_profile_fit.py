@@ -7,8 +7,8 @@ import pytest
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
 from uam_control.profiles.profile_fit import misfits
 from uam_control.vehicle import load_description
-from uam_lab.flight import flight_settings
-from uam_lab.flight.flight_settings import settings
+from uam_lab.flights import flight_settings
+from uam_lab.flights.flight_settings import settings
 
 S500 = load_description()
 

@@ -8,8 +8,8 @@ pytest.importorskip("rclpy")
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import parameter_value_to_python
 
-from uam_lab.flight.operator import NoFlight
-from uam_lab.flight.ros.profile_switch import (
+from uam_lab.flights.operator import NoFlight
+from uam_lab.flights.ros.profile_switch import (
     APPLY,
     NO_RESPONSE,
     NOT_FOUND,

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from uam_control.vehicle import load_description
-from uam_lab.flight.ros.process_fault_injection import program_of
+from uam_lab.flights.ros.process_fault_injection import program_of
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.px4 import px4_parameters as parameters

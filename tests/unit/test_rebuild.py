@@ -8,8 +8,8 @@ pytest.importorskip("rclpy")
 
 from logged_flight import vehicles_log
 
-from uam_lab.report.rebuild import rebuild
-from uam_lab.results.result_folder import ResultFolderError
+from uam_lab.records.rebuild import rebuild
+from uam_lab.records.results.result_folder import ResultFolderError
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from uam_lab.nodes.recorder import _complete
+from uam_lab.records.recorder import _complete
 
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -13,20 +13,20 @@ from set_clock import SetClock
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import load_description
-from uam_lab.rehearsal.engine import RehearsalCourse
-from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
-from uam_sim_bridge.drivers.mocap import calibration
-from uam_sim_bridge.drivers.mocap.calibration import Calibration
-from uam_sim_bridge.drivers.mocap.frame import BodyPose
+from uam_lab.flights.rehearsal.engine import RehearsalCourse
+from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
+from uam_sim_bridge.devices.mocap import calibration
+from uam_sim_bridge.devices.mocap.calibration import Calibration
+from uam_sim_bridge.devices.mocap.frame import BodyPose
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
+from uam_sim_bridge.laboratory.cables import Cables
+from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory
+from uam_sim_bridge.laboratory.person import Person
+from uam_sim_bridge.laboratory.tracked_room import RoomBody
+from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain
 from uam_sim_bridge.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.rehearsal.cables import Cables
-from uam_sim_bridge.rehearsal.laboratory import Devices, Laboratory
-from uam_sim_bridge.rehearsal.person import Person
-from uam_sim_bridge.rehearsal.tracked_room import RoomBody
-from uam_sim_bridge.rehearsal.wiring_mistakes import mistaken_chain
 
 VEHICLE = load_description()
 CHAIN = load_chain(hardware_file("s500_lab"), VEHICLE)
@@ -293,8 +293,8 @@ def test_a_hot_servo_stops_at_its_limit(laboratory):
 
 
 def test_a_file_of_the_matrix_has_thirty_flights():
-    from uam_lab.campaign import fault_matrix
-    from uam_lab.campaign.fault_outcome import REFUSED
+    from uam_lab.experiments.campaign import fault_matrix
+    from uam_lab.experiments.campaign.fault_outcome import REFUSED
 
     matrix = fault_matrix.read(Path("config/campaign/cables.yaml"), "rehearsal")
     cells = matrix.cells(1)[1:]

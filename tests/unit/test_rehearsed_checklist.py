@@ -13,20 +13,20 @@ from free_port import free_port
 
 from uam_control.maths.rotations import matrix_from_quaternion
 from uam_control.vehicle import load_description
-from uam_lab.checklist.guided import guided
-from uam_lab.checklist.limits import ChecklistParameters
-from uam_lab.checklist.samples import GyroIntegral, Sample
-from uam_lab.checklist.step import CONFIRM, Situation, StepState
-from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
-from uam_sim_bridge.drivers.mocap import calibration
-from uam_sim_bridge.drivers.mocap.frame import BodyPose
+from uam_lab.preflight.checklist.guided import guided
+from uam_lab.preflight.checklist.limits import ChecklistParameters
+from uam_lab.preflight.checklist.samples import GyroIntegral, Sample
+from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
+from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
+from uam_sim_bridge.devices.mocap import calibration
+from uam_sim_bridge.devices.mocap.frame import BodyPose
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed
+from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory
+from uam_sim_bridge.laboratory.person import Person
+from uam_sim_bridge.laboratory.tracked_room import RoomBody
+from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_room
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.rehearsal.laboratory import Devices, Laboratory
-from uam_sim_bridge.rehearsal.person import Person
-from uam_sim_bridge.rehearsal.tracked_room import RoomBody
-from uam_sim_bridge.rehearsal.wiring_mistakes import mistaken_room
 
 VEHICLE = load_description()
 CHAIN = load_chain(hardware_file("s500_lab"), VEHICLE)

@@ -10,20 +10,20 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_lab.campaign import rehearsed_trial
-from uam_lab.campaign.fault_matrix import Cell
-from uam_lab.campaign.fault_outcome import LOST, REFUSED, Promise
-from uam_lab.campaign.rehearsed_trial import judged, with_checklist
 from uam_lab.cli.main import main
-from uam_lab.processes.interrupts import INTERRUPTED
-from uam_lab.recording.setpoint_latencies import latencies
-from uam_lab.rehearsal import device_figures, emulated_lab, laboratory_process
-from uam_lab.rehearsal.options import RehearsalOptions
-from uam_lab.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
-from uam_lab.rehearsal.starter import list_passed, list_text, passed_items
-from uam_lab.results.outcome import Outcome
-from uam_lab.vehicle.lab import LabError
-from uam_lab.vehicle.lab_file import load_lab, template
+from uam_lab.experiments.campaign import rehearsed_trial
+from uam_lab.experiments.campaign.fault_matrix import Cell
+from uam_lab.experiments.campaign.fault_outcome import LOST, REFUSED, Promise
+from uam_lab.experiments.campaign.rehearsed_trial import judged, with_checklist
+from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
+from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
+from uam_lab.flights.vehicle.lab import LabError
+from uam_lab.flights.vehicle.lab_file import load_lab, template
+from uam_lab.records.recording.setpoint_latencies import latencies
+from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.vehicle import load_description
-from uam_sim_bridge.rehearsal.hands import Grip, joint_torque, wrench
-from uam_sim_bridge.rehearsal.person import MOTIONS, Person, eased
+from uam_sim_bridge.laboratory.hands import Grip, joint_torque, wrench
+from uam_sim_bridge.laboratory.person import MOTIONS, Person, eased
 
 VEHICLE = load_description()
 

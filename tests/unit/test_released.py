@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.mavlink.offboard.sequence import (
+from uam_control.offboard.modes import MavResult, Mode
+from uam_control.offboard.sequence import (
     COMMANDS,
     NEW_REPORTS,
     OffboardParameters,
@@ -15,7 +16,6 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode
 
 PERIOD = 0.004
 OFFBOARD = Reported(True, True, Mode.OFFBOARD, Mode.OFFBOARD)

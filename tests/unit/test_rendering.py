@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from uam_lab.records.results.timeseries import Series
 from uam_lab.report import build
 from uam_lab.report.build import build_report
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.poses import Poses
 from uam_lab.report.video import flight_video, video
-from uam_lab.results.timeseries import Series
 
 
 def cut(series, end):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from uam_lab.cli.main import main
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.terminal import Terminal
 from uam_lab.report.build import build_report
 from uam_lab.report.facts import flight_summary
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import figures
 from uam_lab.report.page import console, flight_page
 from uam_lab.report.video import flight_video
-from uam_lab.results import timeseries
-from uam_lab.results.terminal import Terminal
 
 
 def text_of(html):

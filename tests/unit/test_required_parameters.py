@@ -6,6 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memory_transport import Memory
 
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.settings.configuration import ConfigurationError, path
 from uam_control.vehicle import load_description
 from uam_msgs_py.messages.layouts import BadMessage
@@ -13,9 +16,6 @@ from uam_msgs_py.messages.parameter_comparison import ParameterComparison, Param
 from uam_msgs_py.messages.status import ERROR, OK, STALE, AutopilotState
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, WRITES
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, BATCH, setting, value_of

@@ -13,8 +13,8 @@ import pytest
 import yaml
 
 from uam_lab.cli import parser
-from uam_lab.results import atomic, result_folder
-from uam_lab.results.result_folder import ResultFolder, ResultFolderError, make_folder
+from uam_lab.records.results import atomic, result_folder
+from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError, make_folder
 
 NOON = datetime(2026, 3, 1, 12, 0, 5)
 
@@ -169,7 +169,7 @@ def test_a_full_disk_is_named_with_the_file_and_is_no_wrong_use(here, capsys):
 CLAIMS = """
 import sys, time
 from pathlib import Path
-from uam_lab.results.result_folder import make_folder
+from uam_lab.records.results.result_folder import make_folder
 make_folder(Path(sys.argv[1]), "campaign")
 print("mine", flush=True)
 time.sleep(60)

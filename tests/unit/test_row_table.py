@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.coordinates import coordinates
-from uam_lab.campaign import fault_rows, trial_rows
-from uam_lab.campaign.fault_trial import FaultResult
-from uam_lab.campaign.trial import TrialResult
-from uam_lab.results.row_table import RowTable, RowTableError
+from uam_lab.experiments.campaign import fault_rows, trial_rows
+from uam_lab.experiments.campaign.fault_trial import FaultResult
+from uam_lab.experiments.campaign.trial import TrialResult
+from uam_lab.records.results.row_table import RowTable, RowTableError
 
 SCHEMA = pa.schema([("flight", pa.int64()), ("error", pa.float64()), ("why", pa.string())])
 
@@ -69,7 +69,7 @@ def test_rows_that_two_parts_have_are_merged(tmp_path):
 
 
 def test_many_parts_are_merged_in_between(tmp_path, monkeypatch):
-    monkeypatch.setattr("uam_lab.results.row_table.PARTS", 3)
+    monkeypatch.setattr("uam_lab.records.results.row_table.PARTS", 3)
     rows = table(tmp_path)
     for number in range(7):
         rows.add(row(number))

@@ -17,10 +17,10 @@ from visualization_msgs.msg import Marker
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_control.mission import load_scenario
-from uam_lab.budget.shuttle import CYCLE, shuttle
-from uam_lab.nodes.scene_markers import PATH_POINTS, PATH_STEP, FlownPath, Markers, ReferencePath
-from uam_lab.recording.bounded_log import BoundedLog
-from uam_lab.recording.message_definitions import schema
+from uam_lab.cockpit.scene_markers import PATH_POINTS, PATH_STEP, FlownPath, Markers, ReferencePath
+from uam_lab.experiments.budget.shuttle import CYCLE, shuttle
+from uam_lab.records.recording.bounded_log import BoundedLog
+from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import tf_message
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.transforms import Transform, transforms_message

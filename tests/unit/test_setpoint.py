@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.maths.rotations import matrix_from_euler
-from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.offboard.setpoint import (
+from uam_control.setpoints.rate_thrust_map import (
     INPUTS,
     RateThrustMap,
     RateThrustParameters,
     SetpointRefused,
 )
+from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 
 ZERO = np.zeros(3)
 VEHICLE = load_description()

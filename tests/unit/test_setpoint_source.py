@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control.frames import swap_body, swap_quaternion
 from uam_control.maths.rotations import (
     euler_from_quaternion,
     matrix_from_euler,
     quaternion_from_euler,
 )
+from uam_control.setpoints.kinds.catalogue import SETPOINTS
+from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.setpoint_source import SetpointSource, Situation
 from uam_control.vehicle import GRAVITY
-from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoint_source import SetpointSource, Situation
-from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS
-from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
 
 TICK = 0.004
 FLYING = Situation(armed=True, landed=False, let_go=False)

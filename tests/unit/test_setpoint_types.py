@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from uam_sim_bridge.mavlink.offboard.setpoints.attitude import attitude_setpoint
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
-from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
+from uam_control.setpoints.kinds.attitude import attitude_setpoint
+from uam_control.setpoints.kinds.desired import Desired, level
+from uam_control.setpoints.kinds.rates import rates_setpoint
 
 HALF = math.sqrt(0.5)
 # turned left by a quarter turn: nose to the north

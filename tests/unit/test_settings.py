@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_lab.flight.flight_settings import SettingsError, settings
+from uam_lab.flights.flight_settings import SettingsError, settings
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4.px4_installation import Px4Error
 

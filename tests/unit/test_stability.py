@@ -12,8 +12,8 @@ from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.stability import analyse_folder
 from uam_lab.analysis.tracking import Tracking
+from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import figures, panels
-from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 
 LAW = ModularParameters(

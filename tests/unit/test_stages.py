@@ -9,7 +9,11 @@ import pytest
 
 from uam_control.estimation import EstimatorParameters
 from uam_control.mission import Mission, load_scenario
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
+from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
@@ -19,10 +23,6 @@ from uam_control.stamps import SECOND, nanoseconds
 from uam_control.supervision import Authority
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import Mode
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 MS = 1_000_000  # [ns]
 PERIOD = 4 * MS

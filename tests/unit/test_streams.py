@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_sim_bridge.mavlink.protocol.modes import MavResult
+from uam_control.offboard.modes import MavResult
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
 

@@ -11,16 +11,16 @@ import pytest
 from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
 from uam_control.mission import load_scenario
-from uam_lab.flight.flight_settings import FlightSettings
-from uam_lab.flight.ros import node_arguments
-from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.timeseries import SUBSYSTEMS
-from uam_lab.study import design, kept, report
-from uam_lab.study.description import StudyError, load_study
-from uam_lab.study.flights import FLOWN, StudyResult
-from uam_lab.study.run import Runner
-from uam_lab.study.search import cost, search
-from uam_lab.workers.place import Workplace
+from uam_lab.experiments.study import design, kept, report
+from uam_lab.experiments.study.description import StudyError, load_study
+from uam_lab.experiments.study.flights import FLOWN, StudyResult
+from uam_lab.experiments.study.run import Runner
+from uam_lab.experiments.study.search import cost, search
+from uam_lab.experiments.workers.place import Workplace
+from uam_lab.flights.flight_settings import FlightSettings
+from uam_lab.flights.ros import node_arguments
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.ports import ports_of
@@ -95,7 +95,7 @@ def test_pd_to_the_same_margin_has_the_gains_of_the_law_at_its_ceilings(study, s
 
 
 def test_the_strengths_leave_the_stated_margins(study):
-    from uam_lab.study.run import margins
+    from uam_lab.experiments.study.run import margins
 
     labels = ("PD", "proposed", "PD to the same margin", "ASMC-1 (reconstructed)")
     rows = [one for one in study.rows if one.label in labels]
@@ -109,7 +109,7 @@ def test_the_strengths_leave_the_stated_margins(study):
 
 def test_the_row_as_converged_has_the_margins_of_its_gains(study):
     """rho of 0.7 of the ceiling's: 1/(1 + 0.7 g) of PD's delay margin is a rough rule."""
-    from uam_lab.study.run import margins
+    from uam_lab.experiments.study.run import margins
 
     row = next(one for one in study.rows if one.frozen == "converged")
     with pytest.raises(ValueError, match="needs the gains"):

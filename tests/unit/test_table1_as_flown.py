@@ -7,8 +7,8 @@ import pytest
 from table1_flights import flights, table
 
 from uam_control.profiles.profile import CONTROLLERS, load_profile, servo_mode
-from uam_lab.compare import plan
-from uam_lab.flight.flight_settings import settings
+from uam_lab.experiments.compare import plan
+from uam_lab.flights.flight_settings import settings
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant import Vehicle
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.mavlink.offboard.thrust_curve import (
+from uam_control.setpoints.thrust_curve import (
     command_of_thrust,
     curve,
     inverse_curve,

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
-from uam_sim_bridge.mavlink.offboard.thrust_identification import (
+from uam_control.setpoints.rate_thrust_map import RateThrustMap
+from uam_control.setpoints.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
 )
+from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 
 DT = 0.004
 MASS, GRAVITY = 2.2, 9.81

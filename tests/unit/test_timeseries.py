@@ -5,8 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 from default_columns import COLUMNS
 
-from uam_lab.results import timeseries
-from uam_lab.results.timeseries import FlightTable, UnreadableFlight
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.timeseries import FlightTable, UnreadableFlight
 
 
 def recording(phases, dt=0.5, start=-1.0):

@@ -6,10 +6,10 @@ import pytest
 
 from uam_lab.cli import rehearse
 from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, tell
-from uam_lab.library.flight_result import FlightResult
-from uam_lab.processes.interrupts import INTERRUPTED
-from uam_lab.results.outcome import Outcome
-from uam_lab.results.terminal import Terminal
+from uam_lab.flights.library.flight_result import FlightResult
+from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.terminal import Terminal
 
 
 @pytest.mark.parametrize(

@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.campaign import trial
-from uam_lab.campaign.trial import Trial, TrialFailed
-from uam_lab.campaign.variations import Draws, VariationError, ranges
 from uam_lab.cli.command import seed
-from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.flight_settings import LAST_SEED, SettingsError, settings
-from uam_lab.results.outcome import Outcome
-from uam_lab.results.timeseries import FlightTable
-from uam_lab.study import flights
-from uam_lab.study.flights import StudyFlight
+from uam_lab.experiments.campaign import trial
+from uam_lab.experiments.campaign.trial import Trial, TrialFailed
+from uam_lab.experiments.campaign.variations import Draws, VariationError, ranges
+from uam_lab.experiments.study import flights
+from uam_lab.experiments.study.flights import StudyFlight
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.flight_settings import LAST_SEED, SettingsError, settings
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.timeseries import FlightTable
 
 PROFILE, RANGES = load_profile("s500"), ranges()
 

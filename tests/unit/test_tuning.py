@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.main import main
-from uam_lab.tuning import convergence, front, search_results
-from uam_lab.tuning.search import Task, evaluated_start, open_study
-from uam_lab.tuning.space import Cost, TuningError, load_space
+from uam_lab.experiments.campaign.trial import TrialResult
+from uam_lab.experiments.tuning import convergence, front, search_results
+from uam_lab.experiments.tuning.search import Task, evaluated_start, open_study
+from uam_lab.experiments.tuning.space import Cost, TuningError, load_space
 
 COST = Cost(
     aim=(1.0,) * 8,

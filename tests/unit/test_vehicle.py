@@ -11,23 +11,23 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_lab.cli.main import main
-from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus
-from uam_lab.flight.progress import Progress, device_table
-from uam_lab.processes.interrupts import StopRequest
-from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.terminal import Terminal
-from uam_lab.vehicle import vehicle_engine, vehicle_nodes
-from uam_lab.vehicle.devices import Report, devices
-from uam_lab.vehicle.lab import Magnet
-from uam_lab.vehicle.lab_file import load_lab, template
-from uam_lab.vehicle.lab_settings import settings_of
-from uam_lab.vehicle.vehicle_course import VehicleCourse
+from uam_lab.flights.observer import STARTING, DeviceState, FlightStatus
+from uam_lab.flights.processes.interrupts import StopRequest
+from uam_lab.flights.progress import Progress, device_table
+from uam_lab.flights.vehicle import vehicle_engine, vehicle_nodes
+from uam_lab.flights.vehicle.devices import Report, devices
+from uam_lab.flights.vehicle.lab import Magnet
+from uam_lab.flights.vehicle.lab_file import load_lab, template
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.results.terminal import Terminal
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import ERROR, OK, STALE
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import RightfulNodes
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnetParameters
 
 LAB = load_lab("s500_lab")
 GRIPPER = replace(LAB, magnet=Magnet("autopilot", output=AutopilotMagnetParameters("gripper")))
@@ -231,7 +231,7 @@ def test_in_the_air_the_first_stop_lands_and_the_second_one_ends(state):
 
 
 def test_the_flight_ends_some_time_after_the_mission(monkeypatch):
-    from uam_lab.vehicle import vehicle_course
+    from uam_lab.flights.vehicle import vehicle_course
 
     now = [100.0]
     monkeypatch.setattr(vehicle_course.time, "monotonic", lambda: now[0])

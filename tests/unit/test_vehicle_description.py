@@ -11,16 +11,16 @@ import yaml
 from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
+from uam_control.setpoints.rate_thrust_map import RateThrustMap
+from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, derived_parameters, load_description
 from uam_control.vehicle.loading import HOVERS, describe
 from uam_lab.analysis import dynamics, supply
-from uam_lab.results.timeseries import Series, columns_of
+from uam_lab.records.results.timeseries import Series, columns_of
 from uam_sim_bridge.autopilot.params import DEFINITIONS, Parameters
 from uam_sim_bridge.faults import FaultError, feasibility, read_schedule
-from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 

@@ -14,11 +14,11 @@ import pytest
 import tiny_work
 from distributed import LocalCluster
 
-from uam_lab.workers import local_cluster
-from uam_lab.workers import workers as module
-from uam_lab.workers.identity import difference, identity
-from uam_lab.workers.place import WorkersError, Workplace
-from uam_lab.workers.workers import workers
+from uam_lab.experiments.workers import local_cluster
+from uam_lab.experiments.workers import workers as module
+from uam_lab.experiments.workers.identity import difference, identity
+from uam_lab.experiments.workers.place import WorkersError, Workplace
+from uam_lab.experiments.workers.workers import workers
 
 PATIENCE = 120.0  # [s] on a busy machine
 

@@ -24,7 +24,7 @@ from uam_lab.analysis.coupling import nominal_inertia
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 from uam_lab.analysis.tracking import Tracking
-from uam_lab.results.timeseries import Series
+from uam_lab.records.results.timeseries import Series
 
 AT = 1.0 - 1e-6  # of a limit or ceiling
 

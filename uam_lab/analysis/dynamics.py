@@ -23,7 +23,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_lab.analysis import ticks
-from uam_lab.results.timeseries import Series
+from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
 

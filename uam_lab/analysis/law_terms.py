@@ -15,7 +15,7 @@ from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
 from uam_lab.analysis import coupling, dynamics, supply, ticks, tracking
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
-from uam_lab.results.timeseries import SUBSYSTEMS, Series, gain_columns
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 TAU = {"position": "tau_p.", "attitude": "tau_q.", "arm": "tau_alpha."}

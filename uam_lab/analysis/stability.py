@@ -23,7 +23,7 @@ from uam_lab.analysis import (
     tracking,
 )
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
-from uam_lab.results.timeseries import SUBSYSTEMS, Series
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 from uam_sim_bridge.plant import Vehicle
 
 LAW = ModularLaw.kind.law

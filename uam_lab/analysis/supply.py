@@ -11,7 +11,7 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
 from uam_lab.analysis.tracking import Tracking
-from uam_lab.results.timeseries import SUBSYSTEMS, Series
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 
 COLUMNS_OF = {"position": POSITION, "attitude": ATTITUDE, "arm": ARM}
 NODE_OF = {name: f"{name}_controller" for name in SUBSYSTEMS}

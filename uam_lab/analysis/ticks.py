@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uam_control.laws.modular import ModularLaw
-from uam_lab.results.timeseries import AXES, SUBSYSTEMS, Series, gain_columns
+from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS, Series, gain_columns
 
 CLEARANCE = 0.01  # [m] above the start position: the feet have no ground contact
 LIFTED = 0.001  # [m] above the payload's start position: only the magnet carries it

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.laws.errors import tracking_errors
-from uam_lab.results.timeseries import Series
+from uam_lab.records.results.timeseries import Series
 
 
 @dataclass(frozen=True)

@@ -12,20 +12,20 @@ from rich.table import Table
 
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cli.command import Command
-from uam_lab.results.terminal import Terminal, say
-from uam_lab.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
-from uam_sim_bridge.drivers.dynamixel import control_table as names
-from uam_sim_bridge.drivers.dynamixel.chain import (
+from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
+from uam_lab.records.results.terminal import Terminal, say
+from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel.chain import (
     SPEEDS,
     ArmChain,
     ArmError,
 )
-from uam_sim_bridge.drivers.dynamixel.control_table import model_name
-from uam_sim_bridge.drivers.dynamixel.driver import NEEDED_LATENCY, ArmDriver
-from uam_sim_bridge.drivers.dynamixel.hardware_errors import advice
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.drivers.dynamixel.servo_bus import ServoBus
-from uam_sim_bridge.drivers.dynamixel.startup import tried
+from uam_sim_bridge.devices.dynamixel.control_table import model_name
+from uam_sim_bridge.devices.dynamixel.driver import NEEDED_LATENCY, ArmDriver
+from uam_sim_bridge.devices.dynamixel.hardware_errors import advice
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.devices.dynamixel.servo_bus import ServoBus
+from uam_sim_bridge.devices.dynamixel.startup import tried
 
 AS_DESCRIBED, OTHERWISE = 0, 1
 EXAMPLES = """\

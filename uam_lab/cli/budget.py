@@ -8,18 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from uam_control.mission import load_scenario
-from uam_lab.budget.path import NoTicks
-from uam_lab.budget.shuttle import JOINTS, shuttle
 from uam_lab.cli.command import Command, chosen_process, number
-from uam_lab.flight import flight_settings
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import CLOCKS, FlightSettings, require_ros
-from uam_lab.flight.progress import Progress
-from uam_lab.library.flight_result import FlightFailed
-from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
-from uam_lab.results.atomic import write_text
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import Terminal, say
+from uam_lab.experiments.budget.path import NoTicks
+from uam_lab.experiments.budget.shuttle import JOINTS, shuttle
+from uam_lab.flights import flight_settings
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import CLOCKS, FlightSettings, require_ros
+from uam_lab.flights.library.flight_result import FlightFailed
+from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
+from uam_lab.flights.progress import Progress
+from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import Terminal, say
 
 MEASURED, NOT_COMPLETED = 0, 1
 SCENARIO = "shuttle.yaml"
@@ -64,7 +64,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fly, print and write the budgets; return the exit status."""
     require_ros()
-    from uam_lab.budget import flown, report
+    from uam_lab.experiments.budget import flown, report
 
     given = vars(options)
     process = chosen_process(given)

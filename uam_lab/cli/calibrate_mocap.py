@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import Command, number
-from uam_lab.results.terminal import say
-from uam_lab.vehicle.lab import LabError
-from uam_lab.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
-from uam_sim_bridge.drivers.mocap.mocap_parameters import (
+from uam_lab.flights.vehicle.lab import LabError
+from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
+from uam_lab.records.results.terminal import say
+from uam_sim_bridge.devices.mocap.mocap_parameters import (
     LIBRARY,
     NATNET,
     SYSTEMS,
@@ -21,8 +21,8 @@ from uam_sim_bridge.drivers.mocap.mocap_parameters import (
 )
 
 if TYPE_CHECKING:
-    from uam_sim_bridge.drivers.mocap.calibration import Calibration
-    from uam_sim_bridge.drivers.mocap.measurement import TimedPose
+    from uam_sim_bridge.devices.mocap.calibration import Calibration
+    from uam_sim_bridge.devices.mocap.measurement import TimedPose
 
 LEVEL, AHEAD = "first place", "second place"
 STEPS = {
@@ -88,8 +88,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, compute and write the calibration; return the exit status."""
-    from uam_sim_bridge.drivers.mocap import calibration, measurement
-    from uam_sim_bridge.drivers.mocap.fit import fit
+    from uam_sim_bridge.devices.mocap import calibration, measurement
+    from uam_sim_bridge.devices.mocap.fit import fit
 
     standing = options.height if options.height is not None else _standing(_vehicle(options))
     found = _recorded(options) if options.log else _measured(options)
@@ -118,9 +118,9 @@ def _standing(vehicle: VehicleDescription) -> float:
 
 def _recorded(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     """Return the first and the last place of a recording at which the vehicle stands still."""
-    from uam_sim_bridge.drivers.mocap import raw_log
-    from uam_sim_bridge.drivers.mocap.frame import MocapError
-    from uam_sim_bridge.drivers.mocap.measurement import places
+    from uam_sim_bridge.devices.mocap import raw_log
+    from uam_sim_bridge.devices.mocap.frame import MocapError
+    from uam_sim_bridge.devices.mocap.measurement import places
 
     found = places(raw_log.read(options.log), min(1.0, options.duration))
     if len(found) < 2:
@@ -145,7 +145,7 @@ def _parameters(options: argparse.Namespace) -> MocapParameters:
 
 def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     """Guide through the two places and measure at each."""
-    from uam_sim_bridge.drivers.mocap import live, measurement, raw_log
+    from uam_sim_bridge.devices.mocap import live, measurement, raw_log
 
     parameters = _parameters(options)
     body = parameters.body
@@ -171,7 +171,7 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
 
 def _confirm(step: str) -> None:
     """Wait until the person confirms a step."""
-    from uam_sim_bridge.drivers.mocap.frame import MocapError
+    from uam_sim_bridge.devices.mocap.frame import MocapError
 
     try:
         input(f"{step}\n   Take your hands off, then press Enter. ")

@@ -9,13 +9,13 @@ from pathlib import Path
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.campaign.trial import Trial, TrialResult
 from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
 from uam_lab.cli.counting import Counting
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import FlightSettings, SettingsError
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import say
+from uam_lab.experiments.campaign.trial import Trial, TrialResult
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import FlightSettings, SettingsError
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
 
 TABLE = "flights.parquet"
 EXAMPLES = """\
@@ -63,7 +63,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
-    from uam_lab.campaign.variations import Draws, ranges
+    from uam_lab.experiments.campaign.variations import Draws, ranges
 
     place = place_of(options)
     vehicle = load_description(options.vehicle)
@@ -78,10 +78,10 @@ def run(options: argparse.Namespace) -> int:
             raise SettingsError("--replay needs one flight: --draws I")
         return _replay(draws[numbers[0]].trial, numbers[0], options.out)
 
-    from uam_lab.campaign import campaign_report, trial_rows
-    from uam_lab.campaign.flying import fly_into
-    from uam_lab.campaign.inputs import inputs
-    from uam_lab.results.row_table import RowTable
+    from uam_lab.experiments.campaign import campaign_report, trial_rows
+    from uam_lab.experiments.campaign.flying import fly_into
+    from uam_lab.experiments.campaign.inputs import inputs
+    from uam_lab.records.results.row_table import RowTable
 
     out = make_folder(options.out, "campaign")
     given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}

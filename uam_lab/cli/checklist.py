@@ -6,11 +6,11 @@ import argparse
 from typing import TYPE_CHECKING
 
 from uam_lab.cli.command import Command, chosen_flight
-from uam_lab.flight.flight_settings import SettingsError, require_ros
-from uam_lab.results.terminal import Terminal, say
+from uam_lab.flights.flight_settings import SettingsError, require_ros
+from uam_lab.records.results.terminal import Terminal, say
 
 if TYPE_CHECKING:
-    from uam_lab.flight.operator import Operator
+    from uam_lab.flights.operator import Operator
 
 PASSED, OPEN = 0, 1  # exit status
 SHOW, CONFIRM, REPEAT, LIVE = "show", "confirm", "repeat", "live"
@@ -47,9 +47,9 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     require_ros()
-    from uam_lab.flight.operator import NoFlight, Operator
-    from uam_lab.processes.guest import Guest
-    from uam_lab.processes.node_environment import transport_environment
+    from uam_lab.flights.operator import NoFlight, Operator
+    from uam_lab.flights.processes.guest import Guest
+    from uam_lab.flights.processes.node_environment import transport_environment
 
     domain, namespace = chosen_flight(options)
     environment = {} if domain is None else transport_environment()

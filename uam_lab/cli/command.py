@@ -16,21 +16,21 @@ from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
-from uam_lab.campaign.trial import TrialFailed
-from uam_lab.campaign.variations import VariationError
-from uam_lab.flight.flight_settings import LAST_SEED, SettingsError
-from uam_lab.recording.mcap_reader import UnreadableLog
-from uam_lab.results.result_folder import ResultFolderError
-from uam_lab.results.row_table import RowTableError
-from uam_lab.results.timeseries import UnreadableFlight
-from uam_lab.study.description import StudyError
-from uam_lab.tuning.space import TuningError
-from uam_lab.vehicle.lab import LabError
-from uam_lab.vehicle.lab_file import FOLDER, TEMPLATE
-from uam_lab.workers.place import WorkersError, Workplace, cores
+from uam_lab.experiments.campaign.trial import TrialFailed
+from uam_lab.experiments.campaign.variations import VariationError
+from uam_lab.experiments.study.description import StudyError
+from uam_lab.experiments.tuning.space import TuningError
+from uam_lab.experiments.workers.place import WorkersError, Workplace, cores
+from uam_lab.flights.flight_settings import LAST_SEED, SettingsError
+from uam_lab.flights.vehicle.lab import LabError
+from uam_lab.flights.vehicle.lab_file import FOLDER, TEMPLATE
+from uam_lab.records.recording.mcap_reader import UnreadableLog
+from uam_lab.records.results.result_folder import ResultFolderError
+from uam_lab.records.results.row_table import RowTableError
+from uam_lab.records.results.timeseries import UnreadableFlight
 from uam_msgs_py.node.namespace import normal
-from uam_sim_bridge.drivers.dynamixel.chain import ArmError
-from uam_sim_bridge.drivers.mocap.frame import MocapError
+from uam_sim_bridge.devices.dynamixel.chain import ArmError
+from uam_sim_bridge.devices.mocap.frame import MocapError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS

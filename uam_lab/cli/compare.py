@@ -10,7 +10,6 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli import study
 from uam_lab.cli.command import (
     DEFAULT_SCENARIO,
@@ -22,11 +21,12 @@ from uam_lab.cli.command import (
     refuse_given,
 )
 from uam_lab.cli.counting import Counting
-from uam_lab.compare import plan
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import ENGINES, require_ros
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import say
+from uam_lab.experiments.campaign.trial import TrialResult
+from uam_lab.experiments.compare import plan
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import ENGINES, require_ros
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 SEEDS = 5
@@ -113,11 +113,11 @@ def run(options: argparse.Namespace) -> int:
         design=options.design,
         tune=options.tune,
     )
-    from uam_lab.campaign import trial_rows
-    from uam_lab.campaign.flying import fly_missing
-    from uam_lab.campaign.inputs import inputs
-    from uam_lab.compare import comparison_report, modularity
-    from uam_lab.results.row_table import RowTable
+    from uam_lab.experiments.campaign import trial_rows
+    from uam_lab.experiments.campaign.flying import fly_missing
+    from uam_lab.experiments.campaign.inputs import inputs
+    from uam_lab.experiments.compare import comparison_report, modularity
+    from uam_lab.records.results.row_table import RowTable
 
     if options.engine == "ros":
         require_ros()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from uam_lab.results.terminal import Terminal, say
+from uam_lab.records.results.terminal import Terminal, say
 
 LINES = 20  # largest number of lines if the output is no terminal
 

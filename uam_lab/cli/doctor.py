@@ -7,11 +7,11 @@ import argparse
 from rich.text import Text
 
 from uam_lab.cli.command import Command
-from uam_lab.doctor.finding import Finding, Verdict
-from uam_lab.doctor.run import as_json, examine, worst
-from uam_lab.results.terminal import Terminal, say
-from uam_lab.vehicle.lab import Lab
-from uam_lab.vehicle.lab_file import load_lab
+from uam_lab.flights.vehicle.lab import Lab
+from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.preflight.doctor.finding import Finding, Verdict
+from uam_lab.preflight.doctor.run import as_json, examine, worst
+from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
 
 FINE, BROKEN = 0, 1

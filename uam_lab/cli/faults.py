@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.campaign.trial import Trial
 from uam_lab.cli.command import (
     Command,
     chosen_effects,
@@ -21,19 +20,20 @@ from uam_lab.cli.command import (
     refuse_given,
 )
 from uam_lab.cli.counting import Counting
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import say
-from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
-from uam_lab.vehicle.lab_settings import settings_of
+from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
+from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
 from uam_sim_bridge.faults import fault_catalogue, feasibility
 from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
 
 if TYPE_CHECKING:
-    from uam_lab.campaign.fault_matrix import Cell, Matrix
-    from uam_lab.campaign.fault_trial import FaultResult
+    from uam_lab.experiments.campaign.fault_matrix import Cell, Matrix
+    from uam_lab.experiments.campaign.fault_trial import FaultResult
 
 BROKEN = 1
 EXAMPLES = """\
@@ -91,10 +91,10 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         say(fault_catalogue.listing())
         return 0
-    from uam_lab.campaign import fault_matrix, fault_report, fault_rows
-    from uam_lab.campaign.flying import fly_missing
-    from uam_lab.campaign.inputs import inputs
-    from uam_lab.results.row_table import RowTable
+    from uam_lab.experiments.campaign import fault_matrix, fault_report, fault_rows
+    from uam_lab.experiments.campaign.flying import fly_missing
+    from uam_lab.experiments.campaign.inputs import inputs
+    from uam_lab.records.results.row_table import RowTable
 
     place = place_of(options)
     check_clock(options.engine, options.clock)
@@ -172,7 +172,7 @@ class _Prepared(NamedTuple):
 
 def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription) -> _Prepared:
     """Prepare the flights of the engines of `uam fly`."""
-    from uam_lab.campaign.fault_trial import FaultTrial, measure
+    from uam_lab.experiments.campaign.fault_trial import FaultTrial, measure
 
     profile = given_profile(options.profile, vehicle)
     mass = load_scenario(matrix.scenario, vehicle).payload_mass
@@ -199,7 +199,7 @@ def _rehearsals(
     options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription
 ) -> _Prepared:
     """Prepare the rehearsals of the lab file."""
-    from uam_lab.campaign.rehearsed_trial import RehearsedTrial, measure
+    from uam_lab.experiments.campaign.rehearsed_trial import RehearsedTrial, measure
 
     lab = load_lab(options.config)
     profile = settings_of(lab).profile

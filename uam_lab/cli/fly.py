@@ -9,15 +9,15 @@ from collections.abc import Iterable
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command, chosen_process, number
-from uam_lab.flight import flight_settings
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
-from uam_lab.flight.progress import Progress
-from uam_lab.library.flight import Engine, Flight
-from uam_lab.library.flight_result import FlightFailed, FlightResult
-from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
+from uam_lab.flights import flight_settings
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
+from uam_lab.flights.library.flight import Engine, Flight
+from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
+from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
+from uam_lab.flights.progress import Progress
+from uam_lab.records.results.terminal import Terminal, say
 from uam_lab.report.page.console import reporting, summary
-from uam_lab.results.terminal import Terminal, say
 from uam_sim_bridge.faults.schedule import late
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED

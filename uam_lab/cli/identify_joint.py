@@ -11,10 +11,10 @@ import numpy as np
 
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, number
-from uam_lab.results.terminal import say
-from uam_sim_bridge.drivers.dynamixel.chain import ArmError
-from uam_sim_bridge.drivers.dynamixel.excitation import ExcitationParameters
-from uam_sim_bridge.drivers.dynamixel.friction_fit import FrictionFit
+from uam_lab.records.results.terminal import say
+from uam_sim_bridge.devices.dynamixel.chain import ArmError
+from uam_sim_bridge.devices.dynamixel.excitation import ExcitationParameters
+from uam_sim_bridge.devices.dynamixel.friction_fit import FrictionFit
 
 DONE, NOT_DONE = 0, 1
 GRID = 181  # angles at which the weight is computed
@@ -65,10 +65,10 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the experiment; return the exit status."""
+    from uam_lab.records.results.result_folder import make_folder
     from uam_lab.report.figures.joint_friction import draw
-    from uam_lab.results.result_folder import make_folder
-    from uam_sim_bridge.drivers.dynamixel.excitation import Aborted, centre_of, excite
-    from uam_sim_bridge.drivers.dynamixel.friction_fit import FitError, fit_friction
+    from uam_sim_bridge.devices.dynamixel.excitation import Aborted, centre_of, excite
+    from uam_sim_bridge.devices.dynamixel.friction_fit import FitError, fit_friction
 
     driver = driver_of(options, CLOCK)
     names = driver.chain.joint_names

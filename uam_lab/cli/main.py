@@ -13,9 +13,9 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 
-from uam_lab.flight.ros import FORKER
-from uam_lab.processes import child, middleware
-from uam_lab.processes.interrupts import INTERRUPTED
+from uam_lab.flights.processes import child, middleware
+from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.flights.ros import FORKER
 
 UTF_8 = "PYTHONUTF8"  # variable of Python
 WITHOUT_NODES = {"-h", "--help", "direct", "--engine=direct"}

@@ -11,10 +11,10 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import Command, number
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import SettingsError
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import say
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import SettingsError
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
 
 STABLE, UNSTABLE = 0, 1
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
@@ -60,10 +60,10 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print and write the margins; return the exit status."""
-    from uam_lab.margins import gains, report
-    from uam_lab.margins.cases import cases_of
-    from uam_lab.margins.pose_delay import pose_delay
-    from uam_lab.report.rebuild import series_of
+    from uam_lab.experiments.margins import gains, report
+    from uam_lab.experiments.margins.cases import cases_of
+    from uam_lab.experiments.margins.pose_delay import pose_delay
+    from uam_lab.records.rebuild import series_of
     from uam_sim_bridge.plant import Vehicle
 
     described = load_description(options.vehicle)

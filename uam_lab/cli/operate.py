@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from uam_control.settings.visible_text import visible
 from uam_lab.cli.command import Command, chosen_flight, number
-from uam_lab.flight.flight_settings import SettingsError, require_ros
-from uam_lab.results.terminal import say
+from uam_lab.flights.flight_settings import SettingsError, require_ros
+from uam_lab.records.results.terminal import say
 
 if TYPE_CHECKING:
-    from uam_lab.flight.operator import Operator
+    from uam_lab.flights.operator import Operator
 
 DONE, REFUSED = 0, 1
 WHAT = {
@@ -94,9 +94,9 @@ def _command(
 def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.Namespace) -> int:
     """Run a command on the flight; return the exit status."""
     require_ros()
-    from uam_lab.flight.operator import NoFlight, Operator
-    from uam_lab.processes.guest import Guest
-    from uam_lab.processes.node_environment import transport_environment
+    from uam_lab.flights.operator import NoFlight, Operator
+    from uam_lab.flights.processes.guest import Guest
+    from uam_lab.flights.processes.node_environment import transport_environment
 
     domain, namespace = chosen_flight(options)
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
-from uam_lab.processes.interrupts import INTERRUPTED
-from uam_lab.results.terminal import say
+from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.records.results.terminal import say
 
 NOT_WRITTEN = 1  # exit status
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -53,7 +53,7 @@ class _Version(argparse.Action):
     """Print the version, and the commit of a checkout, and end."""
 
     def __call__(self, top: argparse.ArgumentParser, *_: object) -> None:
-        from uam_lab.results.result_folder import versions  # asks git
+        from uam_lab.records.results.result_folder import versions  # asks git
 
         found = versions()
         commit = found["git_commit"]

@@ -8,8 +8,8 @@ from typing import Any
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command, chosen_flight
-from uam_lab.flight.flight_settings import SettingsError, require_ros
-from uam_lab.results.terminal import say
+from uam_lab.flights.flight_settings import SettingsError, require_ros
+from uam_lab.records.results.terminal import say
 
 CHANGED, REFUSED = 0, 1
 EXAMPLES = """\
@@ -52,14 +52,14 @@ def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
 
     Raises SettingsError if none of them is there.
     """
-    from uam_lab.flight.operator import NoFlight
-    from uam_lab.flight.ros.profile_switch import (
+    from uam_lab.flights.operator import NoFlight
+    from uam_lab.flights.processes.guest import Guest
+    from uam_lab.flights.processes.node_environment import transport_environment
+    from uam_lab.flights.ros.profile_switch import (
         ProfileSwitch,
         SwitchIncomplete,
         SwitchRefused,
     )
-    from uam_lab.processes.guest import Guest
-    from uam_lab.processes.node_environment import transport_environment
 
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
     with Guest("uam_profile", environment, domain, namespace) as guest:

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 from uam_lab.cli.command import Command, chosen_effects, number
 from uam_lab.cli.fly import tell
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import require_ros
-from uam_lab.flight.progress import Progress
-from uam_lab.library.flight_result import FlightResult
-from uam_lab.processes.interrupts import Interrupts
-from uam_lab.results.terminal import Terminal
-from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
-from uam_lab.vehicle.lab_settings import settings_of
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import require_ros
+from uam_lab.flights.library.flight_result import FlightResult
+from uam_lab.flights.processes.interrupts import Interrupts
+from uam_lab.flights.progress import Progress
+from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.records.results.terminal import Terminal
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.px4 import px4_parameters
@@ -94,9 +94,9 @@ def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
 def run(options: argparse.Namespace) -> int:
     """Rehearse and report; return the exit status."""
     require_ros()
-    from uam_lab.rehearsal import device_figures
-    from uam_lab.rehearsal.flown_rehearsal import fly
-    from uam_lab.rehearsal.options import RehearsalOptions
+    from uam_lab.flights.rehearsal import device_figures
+    from uam_lab.flights.rehearsal.flown_rehearsal import fly
+    from uam_lab.flights.rehearsal.options import RehearsalOptions
 
     lab = load_lab(options.config)
     if options.scenario:

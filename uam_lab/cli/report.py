@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 
 from uam_lab.cli.command import Command
-from uam_lab.flight.flight_settings import require_ros
-from uam_lab.results.result_folder import ResultFolderError, make_folder, read_json
-from uam_lab.results.terminal import Terminal, say
+from uam_lab.flights.flight_settings import require_ros
+from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
+from uam_lab.records.results.terminal import Terminal, say
 
 WRITTEN = 0
 # of metrics.json, without which there is no summary
@@ -51,9 +51,9 @@ def run(options: argparse.Namespace) -> int:
 
 def one(options: argparse.Namespace) -> int:
     """Rebuild the report of one flight; return the exit status."""
+    from uam_lab.records.rebuild import LOG, rebuild
     from uam_lab.report.build import build_report
     from uam_lab.report.page.console import reporting, summary
-    from uam_lab.report.rebuild import LOG, rebuild
 
     (directory,) = options.directories
     out = options.out or directory
@@ -81,10 +81,10 @@ def one(options: argparse.Namespace) -> int:
 
 def several(options: argparse.Namespace) -> int:
     """Write figures and page with several flights overlaid; return the exit status."""
+    from uam_lab.records.rebuild import series_of
     from uam_lab.report.figures.panels import DrawnFlight
     from uam_lab.report.page.console import reporting
     from uam_lab.report.page.overlay import build_overlay, labelled
-    from uam_lab.report.rebuild import series_of
 
     names = labelled(options.directories)
     flights = [

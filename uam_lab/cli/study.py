@@ -12,14 +12,14 @@ from pathlib import Path
 
 from uam_lab.cli.command import place_of
 from uam_lab.cli.counting import Counting
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import SettingsError, require_ros
-from uam_lab.results.atomic import write_rows, write_text
-from uam_lab.results.result_folder import make_folder, read_json, versions, write_json
-from uam_lab.results.terminal import say
-from uam_lab.study.description import Study, load_study
-from uam_lab.study.flights import StudyFlight, StudyResult
-from uam_lab.workers.place import Workplace
+from uam_lab.experiments.study.description import Study, load_study
+from uam_lab.experiments.study.flights import StudyFlight, StudyResult
+from uam_lab.experiments.workers.place import Workplace
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_settings import SettingsError, require_ros
+from uam_lab.records.results.atomic import write_rows, write_text
+from uam_lab.records.results.result_folder import make_folder, read_json, versions, write_json
+from uam_lab.records.results.terminal import say
 
 PARTS = ("margins", "varied", "law", "arm")
 TUNING = "tuning.json"  # of `--tune`: law → costs of the evaluations, best numbers
@@ -27,7 +27,7 @@ TUNING = "tuning.json"  # of `--tune`: law → costs of the evaluations, best nu
 
 def run(options: argparse.Namespace) -> int:
     """Design, tune or fly the study; return the exit status."""
-    from uam_lab.study import design
+    from uam_lab.experiments.study import design
 
     study = load_study(options.study)
     labels = [one.label for one in study.conditions]
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _flier(planned: Sequence[StudyFlight], place: Workplace, out: Path) -> list[StudyResult]:
     """Fly with a progress bar."""
-    from uam_lab.study import kept
+    from uam_lab.experiments.study import kept
 
     with Counting("study", len(planned)) as counting:
         return kept.fly(
@@ -61,9 +61,9 @@ def _flier(planned: Sequence[StudyFlight], place: Workplace, out: Path) -> list[
 
 
 def _tune(study: Study, evaluations: int, out: Path) -> int:
-    from uam_lab.study import figures
-    from uam_lab.study.search import PATIENCE, search
-    from uam_lab.tuning.convergence import in_words as convergence
+    from uam_lab.experiments.study import figures
+    from uam_lab.experiments.study.search import PATIENCE, search
+    from uam_lab.experiments.tuning.convergence import in_words as convergence
 
     file = out / TUNING
     done = read_json(file) if file.exists() else {}
@@ -91,9 +91,9 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
 
 
 def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
-    from uam_lab.results.timeseries import SUBSYSTEMS
-    from uam_lab.study import figures, report
-    from uam_lab.study.run import PROPOSED, SHOWN, Runner, margins
+    from uam_lab.experiments.study import figures, report
+    from uam_lab.experiments.study.run import PROPOSED, SHOWN, Runner, margins
+    from uam_lab.records.results.timeseries import SUBSYSTEMS
 
     parts = tuple(options.part or PARTS)
     texts, said, drawn, flown = [], [], {}, []

@@ -17,14 +17,14 @@ from uam_lab.cli.command import (
     place_of,
 )
 from uam_lab.cli.counting import Counting
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.direct.warm_up import prepare
-from uam_lab.processes.interrupts import INTERRUPTED
-from uam_lab.results.result_folder import make_folder
-from uam_lab.results.terminal import say
-from uam_lab.tuning.convergence import LEAST, SMALL
-from uam_lab.tuning.convergence import in_words as convergence
-from uam_lab.tuning.space import TuningError, load_space
+from uam_lab.experiments.tuning.convergence import LEAST, SMALL
+from uam_lab.experiments.tuning.convergence import in_words as convergence
+from uam_lab.experiments.tuning.space import TuningError, load_space
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.direct.warm_up import prepare
+from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
 
 EXAMPLES = """\
 examples:
@@ -84,8 +84,15 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Search, show the progress, write the results; return the exit status."""
-    from uam_lab.tuning import search_results
-    from uam_lab.tuning.search import DONE, Task, curve, evaluated_start, open_study, search
+    from uam_lab.experiments.tuning import search_results
+    from uam_lab.experiments.tuning.search import (
+        DONE,
+        Task,
+        curve,
+        evaluated_start,
+        open_study,
+        search,
+    )
 
     vehicle = load_description(options.vehicle)
     start = given_profile(options.profile, vehicle) if options.profile else None

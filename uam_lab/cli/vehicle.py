@@ -13,12 +13,12 @@ from pathlib import Path
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command
 from uam_lab.cli.fly import fly
-from uam_lab.flight.conclude import command_line
-from uam_lab.flight.node_options import SettingsError
-from uam_lab.results.result_folder import in_a_name, new_folder
-from uam_lab.results.terminal import say
-from uam_lab.vehicle.lab_file import load_lab, template
-from uam_lab.vehicle.lab_settings import settings_of
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.node_options import SettingsError
+from uam_lab.flights.vehicle.lab_file import load_lab, template
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.records.results.result_folder import in_a_name, new_folder
+from uam_lab.records.results.terminal import say
 
 UNIT = "systemd/uam-vehicle.service"
 DONE = 0
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     if options.systemd:
         say(unit(lab.file, Path.cwd()), end="")
         return DONE
-    from uam_lab.vehicle.vehicle_engine import VehicleEngine  # needs ROS
+    from uam_lab.flights.vehicle.vehicle_engine import VehicleEngine  # needs ROS
 
     settings = settings_of(lab, command_line(), options.dry_run)
     out = options.out

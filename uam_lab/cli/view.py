@@ -8,7 +8,7 @@ import os
 import sys
 
 from uam_lab.cli.command import Command, chosen_flight
-from uam_lab.flight.flight_settings import require_ros
+from uam_lab.flights.flight_settings import require_ros
 
 EXAMPLES = """\
 examples:
@@ -52,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C; return the exit status."""
     require_ros()
     domain, namespace = chosen_flight(options)
-    from uam_lab.nodes import cockpit
-    from uam_lab.processes.node_environment import transport_environment
+    from uam_lab.cockpit import cockpit_node
+    from uam_lab.flights.processes.node_environment import transport_environment
 
     if domain is not None:  # a flight of uam fly; otherwise the user's environment
         os.environ.update(transport_environment(), ROS_DOMAIN_ID=str(domain))
@@ -62,4 +62,4 @@ def run(options: argparse.Namespace) -> int:
     parameters = [word for text in texts for word in ("-p", text)]
     sys.argv = ["cockpit", "--ros-args", "--disable-external-lib-logs", *parameters]
     sys.argv += ["-r", f"__ns:={namespace}"]
-    return cockpit.main()
+    return cockpit_node.main()

@@ -13,7 +13,7 @@ from uam_lab.cockpit.commands import Later, Said
 from uam_lab.cockpit.headline import COLOURS, MARKS
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN
-from uam_lab.results import templates
+from uam_lab.records.results import templates
 from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, read_items
 from uam_msgs_py.messages.status import ChecklistState
 

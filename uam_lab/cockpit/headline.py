@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
-from uam_lab.results import templates
+from uam_lab.records.results import templates
 from uam_msgs_py.messages.status import AutopilotState
 
 COLOURS = {GOOD: "#1b8a5a", CAUTION: "#c77700", BAD: "#c62828", UNKNOWN: "#777777"}

@@ -11,7 +11,7 @@ import secrets
 from urllib.parse import parse_qs, urlsplit
 
 from uam_lab.cockpit.commands import BUTTONS, GOAL, Commands, Later
-from uam_lab.results import templates
+from uam_lab.records.results import templates
 
 ADDRESS, STATE, COMMAND, GOTO = "/control", "/state", "/command", "/goto"
 HEADER = "X-Uam-Command"  # of a command; its value is the secret

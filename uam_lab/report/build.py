@@ -18,13 +18,13 @@ from pathlib import Path
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.stability import Stability, analyse_folder
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.result_folder import PX4_LOG, write_json
 from uam_lab.report.facts import px4_log
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
 from uam_lab.report.video.flight_video import Rendering
-from uam_lab.results import timeseries
-from uam_lab.results.result_folder import PX4_LOG, write_json
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from __future__ import annotations
 
 import math
 
+from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_sim_bridge.autopilot.battery import ChargeState
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
 STREAM_GAP = 0.5  # s, longest interval between two setpoints of a stream (2 Hz)
 STREAM_TIME = 0.5  # s, shortest duration of a stream before OFFBOARD

@@ -9,14 +9,14 @@ import numpy as np
 
 from uam_control.ages import age_by
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
+from uam_control.offboard.modes import MavCmd, MavResult, Severity
+from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Severity
-from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import attitude_target, position_target
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
 _PARAMETERS_PER_TICK = 10
@@ -76,14 +76,14 @@ class Companion:
             self._autopilot.commander.texts.append((Severity.WARNING, text))
 
     def _attitude_target(self, time: float, m: Message) -> None:
-        refused = self._autopilot.target(time, AttitudeTarget.from_message(m))
+        refused = self._autopilot.target(time, attitude_target(m))
         if refused:
             self._say_once(f"setpoint refused: {refused}")
 
     def _position_target(self, time: float, m: Message) -> None:
         refused = f"frame {m.coordinate_frame}, local NED expected"
         if m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED:
-            refused = self._autopilot.target(time, PositionTarget.from_message(m))
+            refused = self._autopilot.target(time, position_target(m))
         if refused:
             self._say_once(f"setpoint refused: {refused}")
 

@@ -13,6 +13,21 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import jit, prepared
+from uam_control.offboard.modes import (
+    CUSTOM_MODE_ENABLED,
+    FORCE,
+    MavCmd,
+    MavResult,
+    Mode,
+)
+from uam_control.setpoints.attitude_target import (
+    ATTITUDE_AND_YAW_RATE,
+    RATES,
+    AttitudeTarget,
+)
+from uam_control.setpoints.position_target import PositionTarget
+from uam_control.setpoints.rotor_geometry import normalised_mixer
+from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
@@ -35,21 +50,6 @@ from uam_sim_bridge.autopilot.loops.rate_control import (
 )
 from uam_sim_bridge.autopilot.loops.rate_control import RATES as FILTERED
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
-from uam_sim_bridge.mavlink.offboard.thrust_curve import inverse_curve
-from uam_sim_bridge.mavlink.protocol.attitude_target import (
-    ATTITUDE_AND_YAW_RATE,
-    RATES,
-    AttitudeTarget,
-)
-from uam_sim_bridge.mavlink.protocol.modes import (
-    CUSTOM_MODE_ENABLED,
-    FORCE,
-    MavCmd,
-    MavResult,
-    Mode,
-)
-from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
 
 FARTHEST_VISION = 1e5  # m
 ACTUATORS = 6  # of DO_SET_ACTUATOR

@@ -15,20 +15,20 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import DISCONNECTED, age_by
+from uam_control.frames import swap_quaternion, swap_sample, swap_world
 from uam_control.maths.compiled import jit, prepared
-from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
-from uam_sim_bridge.mavlink.link.flight_state import FlightState
-from uam_sim_bridge.mavlink.offboard.sequence import (
+from uam_control.offboard.modes import MavResult, Severity
+from uam_control.offboard.sequence import (
     COMMANDS,
     LINK_GAP,
     OffboardSequence,
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
-from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion, swap_sample, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Severity
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
+from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.vision_pose import VisionPose
+from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
+from uam_sim_bridge.mavlink.link.flight_state import FlightState
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
 

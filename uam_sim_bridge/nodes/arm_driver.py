@@ -30,16 +30,16 @@ from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refuse_unknown
-from uam_sim_bridge.drivers.dynamixel.chain import (
+from uam_sim_bridge.devices.dynamixel.chain import (
     DEFAULT_HARDWARE,
     ArmChain,
     ArmError,
     hardware_file,
     load_chain,
 )
-from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver, Reading
-from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver, Reading
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.paced_clock import PacedClock
 

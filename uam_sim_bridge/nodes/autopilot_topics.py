@@ -6,6 +6,7 @@ import math
 
 from sensor_msgs.msg import BatteryState
 
+from uam_control.stages.autopilot_report import AutopilotReport
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison, ParameterDifference
 from uam_msgs_py.messages.ros_time import set_stamp
@@ -14,7 +15,6 @@ from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
 from uam_sim_bridge.mavlink.telemetry.vitals import Battery
-from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 
 BATTERY_PERIOD = 1_000_000_000  # ns
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from uam_control.ages import STALE
+from uam_control.offboard.sequence import OffboardSequence
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.settings.parameter_set import ParameterSet, Text, choice, integer, number, switch
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import LINK, Schedule
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters

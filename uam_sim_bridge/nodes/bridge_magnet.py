@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 
-from uam_msgs_py.node.base_node import UamNode
-from uam_msgs_py.node.node_parameters import NodeParameters
-from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
-from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import (
+from uam_control.offboard.autopilot_magnet import (
     NONE,
     AutopilotMagnet,
     AutopilotMagnetParameters,
 )
+from uam_msgs_py.node.base_node import UamNode
+from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
+from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 
 EXIT_TIME = 1.0  # [s] for the acknowledgement at the node's end

@@ -21,6 +21,7 @@ from uam_control.nodes.mission import MissionNode
 from uam_control.nodes.position_controller import PositionControllerNode
 from uam_control.nodes.state_estimator import StateEstimatorNode
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, Text, number
+from uam_control.stages.control_tick import STAGES
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import UamNode, run_together
 from uam_msgs_py.node.local_delivery import LocalDelivery
@@ -28,7 +29,6 @@ from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 from uam_msgs_py.node.own_endpoints import ignore_own_endpoints
 from uam_msgs_py.node.tick_executor import TickExecutor
 from uam_sim_bridge.nodes.mavlink_bridge import MavlinkBridgeNode
-from uam_sim_bridge.stages.control_tick import STAGES
 
 NAME = wiring.FLIGHT_CONTROLLER
 KINDS: Mapping[str, Callable[[LocalDelivery], UamNode]] = dict(

@@ -35,6 +35,9 @@ from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
 from uam_sim_bridge.faults import CABLE, Schedule
+from uam_sim_bridge.laboratory.cables import Cables
+from uam_sim_bridge.laboratory.laboratory import Laboratory
+from uam_sim_bridge.laboratory.person import Person
 from uam_sim_bridge.nodes import laboratory_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
@@ -42,9 +45,6 @@ from uam_sim_bridge.nodes.laboratory_topics import DriverTopic, imu_driver, pose
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.rehearsal.cables import Cables
-from uam_sim_bridge.rehearsal.laboratory import Laboratory
-from uam_sim_bridge.rehearsal.person import Person
 
 NAME = "laboratory"
 READY = "ready"  # file in the folder of the devices, when they are there

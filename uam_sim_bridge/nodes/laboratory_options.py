@@ -21,10 +21,10 @@ from uam_control.settings.parameter_set import (
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import rightful_nodes
-from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
-from uam_sim_bridge.drivers.mocap import calibration
+from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
+from uam_sim_bridge.devices.mocap import calibration
+from uam_sim_bridge.laboratory.laboratory import Devices
 from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
-from uam_sim_bridge.rehearsal.laboratory import Devices
 
 GPIO, AUTOPILOT, NONE = "gpio", "autopilot", "none"
 TOPIC = "topic"

@@ -12,10 +12,10 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, Line, MagnetError
-from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters, MagnetDriver
-from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
-from uam_sim_bridge.emulation.gpio.file_line import FileLine
+from uam_sim_bridge.devices.magnet.file_line import FileLine
+from uam_sim_bridge.devices.magnet.gpio_line import GpioLine, Line, MagnetError
+from uam_sim_bridge.devices.magnet.magnet_driver import LineParameters, MagnetDriver
+from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 

@@ -23,7 +23,18 @@ from std_srvs.srv import Trigger
 
 from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.nodes.described import described_vehicle
+from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_control.setpoints.kinds.catalogue import SETPOINTS, SetpointParameters
+from uam_control.setpoints.kinds.desired import Desired
+from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.setpoint_source import Setpoint, sent
+from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
+from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
+from uam_control.stages.flight_measurements import FlightMeasurements
+from uam_control.stages.vision_pacing import VisionParameters
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_control.supervision.pace import Waited
@@ -45,14 +56,7 @@ from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 from uam_sim_bridge.mavlink.link.link_report import faults, report
-from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint, sent
-from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS, SetpointParameters
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
-from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
 from uam_sim_bridge.nodes.autopilot_imu_topic import (
     WAKE_UP as IMU_WAKE_UP,
@@ -65,9 +69,6 @@ from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 from uam_sim_bridge.nodes.bridge_magnet import bridge_magnet
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
-from uam_sim_bridge.stages.flight_measurements import FlightMeasurements
-from uam_sim_bridge.stages.vision_pacing import VisionParameters
 
 NAME = "mavlink_bridge"
 LATENCY = 0.05  # s, latency of sensors: a state or pose may be `stale_after` + LATENCY old
@@ -376,7 +377,7 @@ class MavlinkBridgeNode(UamNode):
         )
         measured.update(0.0, 0.004, state, zero, 0.5, True, False, 1.0, spare.curve)
         measured.loop_delay.pause()
-        VisionPose(0.0, zero, level, 1.0, 1.0).message()
+        vision_message(VisionPose(0.0, zero, level, 1.0, 1.0))
 
 
 def _text(value: float, form: str) -> str:

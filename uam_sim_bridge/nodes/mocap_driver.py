@@ -17,10 +17,10 @@ from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_sim_bridge.drivers.mocap import calibration
-from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
-from uam_sim_bridge.drivers.mocap.frame import MocapError
-from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters, open_source
+from uam_sim_bridge.devices.mocap import calibration
+from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
+from uam_sim_bridge.devices.mocap.frame import MocapError
+from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters, open_source
 from uam_sim_bridge.nodes.late_device import LateDevice
 
 NAME = "mocap_driver"

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 from scipy.spatial.transform import Rotation
 
-from uam_lab.results.timeseries import Series, UnreadableFlight
+from uam_lab.records.results.timeseries import Series, UnreadableFlight
 
 STEP = 0.004  # [s] of the grid on which the logs are aligned
 MISSING = "PX4's log is not shown: pip install pyulog"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from uam_lab.results.timeseries import SUBSYSTEMS
+from uam_lab.records.results.timeseries import SUBSYSTEMS
 
 LOOSE = 0.1  # V / bound; below it the page calls the bound loose
 

@@ -15,14 +15,14 @@ from matplotlib.ticker import NullFormatter
 
 from uam_control.laws import catalogue
 from uam_control.laws.law import GainGroup
+from uam_lab.records.results import metrics
+from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.px4_figure import px4_log
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
-from uam_lab.results import metrics
-from uam_lab.results.timeseries import AXES, SUBSYSTEMS
 
 DEGREES = 180.0 / np.pi
 ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from uam_lab.report.figures import style
-from uam_sim_bridge.drivers.dynamixel.friction_fit import FrictionFit
+from uam_sim_bridge.devices.dynamixel.friction_fit import FrictionFit
 
 SHOWN = 4000  # dots
 

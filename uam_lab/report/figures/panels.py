@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from uam_lab.records.results.timeseries import ON_GROUND, Series
 from uam_lab.report.facts import change_rows
 from uam_lab.report.figures import fault_marks, style
-from uam_lab.results.timeseries import ON_GROUND, Series
 
 if TYPE_CHECKING:
     from uam_lab.analysis.stability import Stability

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from uam_control.coordinates import arm_coordinates
+from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import style
 from uam_lab.report.figures.panels import DrawnFlight, corner_legend, flight_keys
 from uam_lab.report.figures.poses import Poses
-from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET
 
 POSES = 5

@@ -8,7 +8,7 @@ import numpy as np
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import DEFAULT_VEHICLE
-from uam_lab.results.timeseries import Series
+from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant.vehicle import BASE, PAYLOAD, SWING, Vehicle
 
 OUT_OF_SIGHT = (50.0, 50.0, -1.0)

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from uam_control.coordinates import ALPHA
+from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.results.timeseries import SUBSYSTEMS
 
 if TYPE_CHECKING:
     from uam_lab.analysis.lyapunov_bound import ComparisonSystem

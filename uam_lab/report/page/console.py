@@ -12,8 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from uam_control.laws import catalogue
+from uam_lab.records.results.terminal import Terminal
 from uam_lab.report.facts import flight_summary
-from uam_lab.results.terminal import Terminal
 
 
 @contextmanager

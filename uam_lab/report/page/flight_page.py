@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
+from uam_lab.records.results import templates
+from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.result_folder import PX4_LOG, read_json
 from uam_lab.report.facts import change_rows, flight_summary, stability_rows
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import fault_marks
 from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.video.flight_video import Rendered, existing
-from uam_lab.results import templates
-from uam_lab.results.atomic import write_text
-from uam_lab.results.result_folder import PX4_LOG, read_json
 
 PAPER_SCENARIO = "pick_and_place"
 FACTS = (

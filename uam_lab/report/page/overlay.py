@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from uam_lab.records.results import metrics, templates
+from uam_lab.records.results.atomic import write_text
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.results import metrics, templates
-from uam_lab.results.atomic import write_text
 
 
 def build_overlay(

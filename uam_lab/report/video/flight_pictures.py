@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures.poses import Poses
-from uam_lab.results.timeseries import Series
 
 FOLLOW = 0.62  # camera motion / vehicle motion; below 1, so that the motion is visible
 SMOOTHING_S = 2.0

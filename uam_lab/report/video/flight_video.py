@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_lab.results import timeseries
-from uam_lab.results.atomic import replacing
-from uam_lab.results.timeseries import Series
+from uam_lab.records.results import timeseries
+from uam_lab.records.results.atomic import replacing
+from uam_lab.records.results.timeseries import Series
 
 SNAPSHOT_SIZE = (1280, 720)
 CAPTION_PART = 0.11  # of the height; large enough for the strip

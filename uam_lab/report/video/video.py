@@ -12,9 +12,9 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from uam_lab.records.results.atomic import replacing
+from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures.panels import MARGIN_S
-from uam_lab.results.atomic import replacing
-from uam_lab.results.timeseries import Series
 
 WHITE = (255, 255, 255)
 SHADE = (20, 30, 40, 150)

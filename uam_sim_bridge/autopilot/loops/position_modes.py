@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from uam_control.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from uam_control.offboard.modes import Mode
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY, POSITION, VELOCITY
 from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 MODES = (Mode.HOLD, Mode.POSITION, Mode.RETURN)
 _STICK_ZERO = 0.1  # stick deflection that counts as none (PX4: MPC_HOLD_DZ)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.frames import swap_body, swap_quaternion
 from uam_sim_bridge.mavlink.hil.hil_sensors import TEMPERATURE, SlowSensors
-from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 
 _IMU, _MAG, _BARO = 0x3F, 0x1C0, 0x1A00  # HIL_SENSOR.fields_updated

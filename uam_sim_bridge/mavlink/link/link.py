@@ -11,20 +11,21 @@ import math
 from collections.abc import Callable
 
 from uam_control.ages import DISCONNECTED
-from uam_sim_bridge.mavlink.link.flight_state import FlightState
-from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnet
-from uam_sim_bridge.mavlink.offboard.sequence import (
+from uam_control.offboard.autopilot_magnet import AutopilotMagnet
+from uam_control.offboard.modes import MavCmd, MavResult, Mode, Severity
+from uam_control.offboard.sequence import (
     COMMANDS,
     LINK_GAP,
     OffboardSequence,
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode, Severity
+from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.vision_pose import VisionPose
+from uam_sim_bridge.mavlink.link.flight_state import FlightState
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, vision_message
 from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import NUMBER as HIGHRES_IMU
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
@@ -255,11 +256,11 @@ class OffboardLink(FlightState):
         """
         if target.refused() or target.thrust < 0.0 or target.thrust > 1.0:
             raise ValueError(f"setpoint {target}; finite values and thrust 0..1 allowed")
-        self._send(target.message(time, self._target))
+        self._send(setpoint_message(target, time, self._target))
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
-        self._send(pose.message())
+        self._send(vision_message(pose))
 
     def close(self) -> None:
         """Close the transport."""

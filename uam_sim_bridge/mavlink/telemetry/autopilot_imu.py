@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
+from uam_control.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 from uam_sim_bridge.mavlink.telemetry.clock_map import ClockMap
 from uam_sim_bridge.mavlink.telemetry.time_sync import TimeSync

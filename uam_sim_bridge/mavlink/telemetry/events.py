@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import struct
 
+from uam_control.offboard.modes import Severity
 from uam_control.settings import configuration, yaml_file
-from uam_sim_bridge.mavlink.protocol.modes import Severity
 from uam_sim_bridge.mavlink.telemetry.event_messages import ARGUMENTS, EventMessage
 
 OFFBOARD = 1 << 14  # PX4's navigation_mode_group of OFFBOARD

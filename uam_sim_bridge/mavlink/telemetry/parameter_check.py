@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Message
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, RETRY, ParameterReader
 from uam_sim_bridge.mavlink.telemetry.required_parameters import (

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, result_word
+from uam_control.offboard.modes import MavResult, result_word
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 # message id → desired rate [Hz]

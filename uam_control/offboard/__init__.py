@@ -1,0 +1,1 @@
+"""Offboard control seen from the companion computer: modes, arming, the sequence of requests."""

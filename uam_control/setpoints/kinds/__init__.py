@@ -1,0 +1,1 @@
+"""Kinds of setpoints: body rates, attitude, position."""

@@ -1,0 +1,243 @@
+"""Stage: tau_p and tau_q → setpoint of the autopilot; vision, OFFBOARD, arming, thrust factor.
+
+At a tick: `hear` takes what the autopilot sent, then `tick` sends heartbeat and requests, the
+newest pose, the setpoint, and compares the thrust with the acceleration. `without` stands in for
+`tick` where no commands come.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from uam_control.control.sample_hold import SampleHold
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import OffboardSequence
+from uam_control.setpoints.kinds.catalogue import SetpointParameters
+from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.setpoint_source import (
+    Setpoint,
+    SetpointSource,
+    Situation,
+    sent,
+    silent,
+)
+from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
+from uam_control.stages.autopilot_port import AutopilotPort
+from uam_control.stages.autopilot_report import AutopilotReport, AutopilotReports
+from uam_control.stages.flight_measurements import FlightMeasurements
+from uam_control.stages.vision_pacing import VisionPacing, VisionParameters
+from uam_control.stamps import SECOND
+from uam_control.vehicle import VehicleDescription
+
+# The mission's status comes from another process. It counts from a stamp on by which it has arrived
+# everywhere, so that a lockstep flight is the same every time.
+STATUS_DELAY = 10_000_000  # [ns]
+
+
+@dataclass(frozen=True)
+class BridgeSets:
+    """The parameter sets of the stage."""
+
+    mapping: RateThrustParameters
+    hold: HoldParameters
+    identification: ThrustIdentificationParameters
+    vision: VisionParameters
+    setpoint: SetpointParameters
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription, section: Mapping[str, Any]) -> Self:
+        """Return the sets of a vehicle, overridden by a profile's section mavlink_bridge."""
+        return cls(
+            RateThrustParameters.of(vehicle, section),
+            HoldParameters.among(section),
+            ThrustIdentificationParameters.of(vehicle, section),
+            VisionParameters.among(section),
+            SetpointParameters.among(section),
+        )
+
+
+LIFT_PERIOD = 100_000_000  # [ns] between two reports of thrust factor and lift
+LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
+
+
+class BridgeStage:
+    """The bridge between control laws and autopilot. All stamps in [ns].
+
+    `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
+    they are returned, and the autopilot gets none of them.
+    `sent`: body rates (3,) [rad/s, FLU] and thrust of the last setpoint, see `sent`;
+    `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by
+    that factor, at LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the
+    report of the autopilot due after the last tick, None if none is due.
+    """
+
+    def __init__(
+        self,
+        sets: BridgeSets,
+        vehicle: VehicleDescription,
+        autopilot: AutopilotPort,
+        sequence: OffboardSequence,
+        fresh: float = math.inf,
+        say: Callable[[str, str | None], None] = silent,
+        dry_run: bool = False,
+    ) -> None:
+        """sequence: the one of `autopilot`; fresh, say: see `SetpointSource`; dry_run: setpoints
+        are computed and not sent, and nothing is armed."""
+        self._dry_run = dry_run
+        self.autopilot, self.sequence = autopilot, sequence
+        self.map = RateThrustMap(sets.mapping, vehicle)
+        self._measurements = FlightMeasurements(sets.identification, vehicle)
+        self.identification = self._measurements.identification
+        self.loop_delay = self._measurements.loop_delay
+        self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
+        self._vision = VisionPacing(sets.vision)
+        self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
+        self._reports = AutopilotReports(autopilot, sequence, self.loop_delay)
+        self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
+        self._regains = 0
+        self._situation = Situation(armed=False, landed=True, let_go=False)
+        self.report: AutopilotReport | None = None
+        self.hands = False
+        self.factor = 1.0
+        self.sent = sent(None)
+        self.lift_due = False
+        self._last = 0  # stamp [ns] of the last tick
+
+    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Handle a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
+
+        In flight the poses of a frozen tracker are discarded.
+        """
+        if self._vision.take(stamp / SECOND, position, quaternion, self.autopilot.armed):
+            self.source.note_pose(stamp / SECOND, quaternion)
+
+    def arm(self, arm: bool) -> None:
+        """Take the mission's desired arming state."""
+        self.sequence.set_desired(arm and not self._dry_run)
+
+    def mission(self, stamp: int, magnet: bool, failsafe: bool, regains: int) -> None:
+        """Take the mission's status.
+
+        magnet: whether it is on. failsafe: whether the autopilot's failsafe is to act. regains:
+        number of commands so far to regain a released vehicle. They count from STATUS_DELAY on.
+        """
+        self.identification.switch(stamp / SECOND, magnet)
+        if self._orders and stamp < self._orders[-1][0]:  # a clock that began anew
+            self._orders.clear()
+        self._orders.append((stamp, failsafe, regains))
+
+    def note_state(self, stamp: int, state: np.ndarray) -> None:
+        """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
+        self.source.note_state(stamp / SECOND, state)
+
+    def hear(self, stamp: int, old: bool = False) -> None:
+        """Take what the autopilot has sent, and the mission's status that counts by now.
+
+        old: whether the tick has waited while a process stood still: it gets no setpoint.
+        """
+        self.autopilot.poll(stamp / SECOND)
+        self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, old)
+        while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
+            commanded, self.sequence.let_go, regains = self._orders.popleft()
+            if regains > self._regains:
+                self.sequence.regain(commanded / SECOND)
+            self._regains = regains
+        sequence = self.sequence
+        situation = (
+            self.autopilot.armed,
+            self.autopilot.landed,
+            sequence.let_go,
+            sequence.released,
+            self.autopilot.mode is Mode.OFFBOARD,
+            sequence.stopped,
+            sequence.withheld,
+            sequence.after_loss,
+        )
+        if situation != self._situation:
+            self._situation = Situation(*situation)
+
+    def tick(
+        self,
+        stamp: int,
+        state: np.ndarray,
+        flying: bool,
+        tau_p: np.ndarray,
+        tau_q: np.ndarray | None,
+        attitude: np.ndarray,
+        reference: np.ndarray,
+    ) -> Setpoint:
+        """Send the setpoint of a tick with commands, and return it; None: none was sent.
+
+        state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,) [N m, FLU], None
+        for idle; attitude (3, 3): of the position law, reference (3, 3): of the mission, see
+        `Desired`.
+        """
+        now, situation = stamp / SECOND, self._situation
+        setpoint = self.source.commanded(
+            now, state, flying, tau_p, tau_q, attitude, situation, reference
+        )
+        setpoint = self._sampled(now, setpoint, flying)
+        self.sent = rates, thrust = sent(setpoint)
+        self._send(now, setpoint)
+        airborne = flying and situation.armed
+        self.factor = factor = self.map.thrust_factor
+        found = self._measurements.update(
+            now,
+            min(max(stamp - self._last, 0) / SECOND, LONGEST_STEP),
+            state,
+            rates,
+            thrust,
+            airborne and setpoint is not None and not self.source.holding,
+            airborne and not situation.let_go,
+            factor,
+            self.map.curve,
+        )
+        if found != factor:
+            self.map.thrust_factor = found
+        self.lift_due = stamp // LIFT_PERIOD != self._last // LIFT_PERIOD
+        self._last = stamp
+        self.report = self._reports.due(stamp)
+        return setpoint
+
+    @property
+    def lift(self) -> float:
+        """See the class."""
+        return self._measurements.lift
+
+    def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
+        """Return the setpoint of the last period at `now` [s] if this one is not due."""
+        if not flying or setpoint is None:
+            self._kept = None
+            return setpoint
+        if self._hold.due(now) or self._kept is None:
+            self._kept = setpoint
+        return self._kept
+
+    def without(self, stamp: int) -> Setpoint:
+        """Send the setpoint of a tick without valid commands, and return it."""
+        now, self._kept = stamp / SECOND, None
+        self.loop_delay.pause()
+        setpoint = self.source.without(now, self._situation)
+        self.sent = sent(setpoint)
+        self._send(now, setpoint)
+        self.report = self._reports.due(stamp)
+        self.factor = self.map.thrust_factor
+        return setpoint
+
+    def _send(self, now: float, setpoint: Setpoint) -> None:
+        """Send the messages due at `now` [s]: heartbeat and requests, vision, setpoint."""
+        autopilot = self.autopilot
+        if self.hands and not self._situation.armed:
+            setpoint = self.source.without(now, self._situation)
+        autopilot.tick(now)
+        self._vision.send(autopilot, now)
+        if setpoint is not None and self.sequence.streaming and not self._dry_run:
+            autopilot.send_setpoint(setpoint, now)
+            self.sequence.streamed(now)

@@ -1,0 +1,118 @@
+"""What the bridge measures in flight, from the setpoints it sends and the motion that follows.
+
+One compiled call per tick: loop delay, thrust factor, lift.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, CHI_DOT, ROLL
+from uam_control.maths.compiled import jit, prepared
+from uam_control.setpoints.loop_delay import (
+    DelayNumbers,
+    DelaySums,
+    LoopDelay,
+    follow,
+    pause,
+)
+from uam_control.setpoints.thrust_curve import thrust_of_command
+from uam_control.setpoints.thrust_identification import (
+    ThrustIdentification,
+    ThrustIdentificationParameters,
+    identify,
+)
+from uam_control.vehicle import VehicleDescription
+
+LIFT_CUTOFF = 1.0  # [Hz]
+
+
+class MeasurementArrays(NamedTuple):
+    """State of the measurements.
+
+    sums: of the loop delay; record, memory: of the thrust identification, both structured (1,);
+    lift (1,) [N].
+    """
+
+    sums: DelaySums
+    record: np.ndarray
+    memory: np.ndarray
+    lift: np.ndarray
+
+
+@jit
+def measure(
+    now: float,
+    step: float,
+    state: np.ndarray,
+    rates: np.ndarray,
+    thrust: float,
+    looped: bool,
+    flown: bool,
+    factor: float,
+    curve: tuple[float, float, float, float],
+    arrays: MeasurementArrays,
+    numbers: DelayNumbers,
+) -> float:
+    """Advance the measurements by one tick; return the new thrust factor.
+
+    now [s]; step [s]: since the last tick, for the lift; state (3, 6 + n); rates (3,) [rad/s, FLU],
+    thrust 0..1: sent at the tick; looped: whether the laws made the setpoint of a flying vehicle;
+    flown: whether the thrust acts on it; factor: used for the setpoint; curve: see
+    `RateThrustMap.curve`; numbers: of the loop delay.
+    """
+    sums, record, memory, lift = arrays
+    if looped:
+        follow(now, rates, state[CHI_DOT, ROLL:ALPHA], sums, numbers)
+    else:
+        pause(sums)
+    assumed = thrust_of_command(thrust, curve[0], curve[1], curve[2], curve[3])
+    gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
+    lift[0] += gain * (factor * assumed - lift[0])
+    flown = flown and math.isfinite(thrust)
+    return identify(now, state, thrust, assumed, flown, record, memory)
+
+
+class FlightMeasurements:
+    """The measurements: `loop_delay`, `identification`, and the `lift`."""
+
+    def __init__(
+        self, parameters: ThrustIdentificationParameters, vehicle: VehicleDescription
+    ) -> None:
+        self.identification = ThrustIdentification(parameters, vehicle)
+        self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
+        self._lift = np.zeros(1)
+        memory = self.identification.record, self.identification.memory
+        self._arrays = MeasurementArrays(self.loop_delay.sums, *memory, self._lift)
+        self._measure = prepared(
+            *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), np.zeros(3), 0.0, True, True, 1.0),
+            *((0.0, 0.0, 0.0, 0.0), self._arrays, self.loop_delay.numbers),
+        )
+
+    @property
+    def lift(self) -> float:
+        """Low-pass of the collective [N] by the thrust factor used, at LIFT_CUTOFF."""
+        return self._lift.item(0)
+
+    def update(
+        self,
+        now: float,
+        step: float,
+        state: np.ndarray,
+        rates: np.ndarray,
+        thrust: float,
+        looped: bool,
+        flown: bool,
+        factor: float,
+        curve: tuple[float, float, float, float],
+    ) -> float:
+        """Take a tick and return the new thrust factor; see `measure`."""
+        if self.identification.magnet_waits:
+            self.identification.follow_magnet(now, math.isfinite(now + thrust))
+        return self._measure(
+            *(now, step, state, rates, thrust, looped, flown, factor, curve),
+            *(self._arrays, self.loop_delay.numbers),
+        )

@@ -1,0 +1,1 @@
+"""Many flights: campaigns, comparisons, studies, searches, margins, budgets."""

@@ -1,0 +1,170 @@
+"""Results of `uam campaign`: success rate, errors, slices by each drawn value, worst flights."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from uam_control.coordinates import BASE_COORDINATES, POSITION
+from uam_lab.experiments.campaign.campaign_figure import picture
+from uam_lab.experiments.campaign.campaign_table import CampaignTable
+from uam_lab.experiments.campaign.fault_outcome import COMPLETED, OUTCOMES
+from uam_lab.experiments.campaign.statistics import percentile, share, sliced
+from uam_lab.experiments.campaign.variations import common
+from uam_lab.records.results import templates
+from uam_lab.records.results.atomic import write_rows, write_text
+from uam_lab.records.results.result_folder import versions, write_json
+from uam_lab.report.figures import style
+
+PERCENTILES = (50, 90, 99)
+WORST = 10  # flights that are listed
+
+
+def write(out: Path, table: pa.Table, vehicle: str, command: str, again: str) -> str:
+    """Write flights.csv, campaign.json, campaign.png, summary.md and report.html; return summary.
+
+    table: of the flights; vehicle: its name; again: command that flies one flight again, to which
+    `--draws NUMBER --replay` is added.
+    """
+    flights = CampaignTable(table)
+    shared = common(flights.drawn, flights.failed)
+    write_rows(
+        out / "flights.csv",
+        ["flight", *flights.drawn, *(f"rms {n}" for n in flights.names), "outcome", "why"],
+        (
+            [
+                number,
+                *(f"{column[row]:.4g}" for column in flights.drawn.values()),
+                *(f"{x:.4g}" for x in flights.rms[row]),
+                flights.outcome[row],
+                flights.why[row],
+            ]
+            for row, number in enumerate(flights.numbers)
+        ),
+    )
+    slices = {n: sliced(v, flights.failed, flights.error) for n, v in flights.drawn.items()}
+    worst = [_listed(flights, row, again) for row in flights.worst(WORST)]
+    percentiles = {str(p): [percentile(c, p) for c in flights.rms.T] for p in PERCENTILES}
+    numbers = {
+        "command": command,
+        "vehicle": vehicle,
+        "versions": versions(),
+        "flights": len(flights),
+        "outcomes": flights.outcomes,
+        "columns": flights.names,
+        "rms_percentiles": {p: [one[0] for one in row] for p, row in percentiles.items()},
+        "rms_percentiles_band": {p: [one[1:] for one in row] for p, row in percentiles.items()},
+        "failures_have_in_common": shared,
+        "slices": {name: [asdict(one) for one in bins] for name, bins in slices.items()},
+        "worst": worst,
+    }
+    write_json(out / "campaign.json", numbers)
+    paragraphs = [*_summary(flights, shared, vehicle), _worst_table(worst)]
+    summary = "\n\n".join([*paragraphs, f"Made by `{command}`.\n"])
+    write_text(out / "summary.md", summary)
+    with style.styled():
+        style.save(picture(flights, vehicle), out / "campaign.png")
+    page = templates.render(
+        "uam_lab.experiments.campaign",
+        "campaign.html.j2",
+        vehicle=vehicle,
+        sentence=_sentence(flights, vehicle),
+        names=flights.names,
+        percentiles=_percentile_rows(flights),
+        heads=PERCENTILES,
+        picture=templates.embedded(out / "campaign.png"),
+        slices=slices,
+        worst=worst,
+        outcomes=OUTCOMES,
+        command=command,
+    )
+    write_text(out / "report.html", page)
+    return summary
+
+
+def _listed(flights: CampaignTable, row: int, again: str) -> dict[str, Any]:
+    number = int(flights.numbers[row])
+    return {
+        "flight": number,
+        "outcome": flights.outcome[row],
+        "position_rms_m": float(flights.error[row]),
+        "why": flights.why[row],
+        "drawn": {name: float(values[row]) for name, values in flights.drawn.items()},
+        "again": f"{again} --draws {number} --replay",
+    }
+
+
+def _sentence(flights: CampaignTable, vehicle: str) -> str:
+    count, outcomes = len(flights), flights.outcomes
+    done, low, high = (100.0 * x for x in share(outcomes[COMPLETED], count))
+    others = [f"{n} {outcome}" for outcome, n in outcomes.items() if n and outcome != COMPLETED]
+    return (
+        f"{vehicle}: {outcomes[COMPLETED]} of {count} flights completed the mission "
+        f"({done:.1f} %, 95 % band {low:.1f} to {high:.1f} %); {', '.join(others) or 'none lost'}."
+    )
+
+
+def _percentile_rows(flights: CampaignTable) -> list[list[str]]:
+    rows = []
+    for name, column in zip(flights.names, flights.rms.T, strict=True):
+        unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
+        found = [percentile(column, p) for p in PERCENTILES]
+        rows.append([name, *(_with_band(one, digits, unit) for one in found)])
+    return rows
+
+
+def _with_band(found: tuple[float, float, float], digits: int, unit: str) -> str:
+    """Return a percentile in words; too few flights give no upper end of the band, or nothing."""
+    middle, low, high = found
+    if math.isnan(middle):
+        return "unknown"
+    end = f"to {high:.{digits}f}" if math.isfinite(high) else "or more"
+    return f"{middle:.{digits}f} {unit} ({max(low, 0.0):.{digits}f} {end})"
+
+
+def _summary(
+    flights: CampaignTable, shared: Sequence[tuple[str, float, float, float]], vehicle: str
+) -> Iterator[str]:
+    """Yield the paragraphs; shared: see `common`."""
+    yield _sentence(flights, vehicle)
+    others = [o for o, n in flights.outcomes.items() if n and o != COMPLETED]
+    if others:
+        yield "\n".join(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others)
+    head = ["RMS error", *(f"{p} % of flights below (95 % band)" for p in PERCENTILES)]
+    yield templates.markdown_table(head, _percentile_rows(flights))
+    if not shared:
+        return
+    yield "Conditions of the flights that were not completed, the largest distance first:"
+    head = ["", "their mean", "mean of the others", "distance [standard deviations]"]
+    rows = ([n, f"{a:.3g}", f"{b:.3g}", f"{d:+.2f}"] for n, a, b, d in shared)
+    yield templates.markdown_table(head, rows)
+    failed = [why for why, bad in zip(flights.why, flights.failed, strict=True) if bad]
+    kinds = Counter(map(_kind, failed))
+    yield "Reasons: " + "; ".join(f"{kind}: {kinds[kind]}" for kind in sorted(kinds)) + "."
+
+
+def _worst_table(worst: Sequence[dict[str, Any]]) -> str:
+    return templates.markdown_table(
+        ["worst flights", "outcome", "position RMS [m]", "with report and video"],
+        (
+            [
+                str(one["flight"]),
+                one["outcome"],
+                "unknown" if math.isnan(one["position_rms_m"]) else f"{one['position_rms_m']:.3g}",
+                f"`{one['again']}`",
+            ]
+            for one in worst
+        ),
+    )
+
+
+def _kind(why: str) -> str:
+    """Return a reason without its numbers, so that similar ones are counted together."""
+    words = [word for word in why.split(";")[0].split() if not any(c.isdigit() for c in word)]
+    return " ".join(words)

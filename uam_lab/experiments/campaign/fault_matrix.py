@@ -1,0 +1,209 @@
+"""The cells of a matrix fault × moment, read from config/campaign/faults.yaml or another file.
+
+With `draws` the flights are random ones of the matrix: one or two of its faults, each at one of its
+moments, with one of its durations. A value [low, high] in the file is drawn between both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from uam_control.mission import Scenario, load_scenario
+from uam_control.settings import yaml_file
+from uam_control.vehicle import VehicleDescription
+from uam_lab.experiments.campaign.fault_outcome import Promise, read_promise
+from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
+from uam_sim_bridge.faults.feasibility import needs_nodes
+from uam_sim_bridge.faults.schedule import listed, timed
+
+NOMINAL = "no fault"
+KEYS = ("scenario", "moments", "faults")
+DURATIONS = "durations"  # optional: of each row without its own; null: for good
+PAIRS = 0.5  # share of the drawn flights with two faults
+AND = " and another"  # after the name of the first fault of two
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One flight. fault: the row; moment: the column, "" for the flight without any fault."""
+
+    fault: str
+    moment: str
+    schedule: Schedule
+    promise: Promise | None = None
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Flights of a campaign. moments: entries with the times by name; promises: one per row;
+    left_out: rows that the engine cannot fly; own_moments: of each row, () for all. draws: number
+    of random flights in place of one per cell, with `durations` for rows without their own."""
+
+    scenario: str
+    moments: dict[str, dict[str, Any]]
+    faults: tuple[dict[str, Any], ...]
+    promises: tuple[Promise | None, ...]
+    left_out: tuple[str, ...] = ()
+    own_moments: tuple[tuple[str, ...], ...] = ()
+    draws: int = 0
+    durations: tuple[Any, ...] = ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        if self.draws:
+            names = dict.fromkeys(entry["fault"] for entry in self.faults)
+            return tuple(name + more for name in names for more in ("", AND))
+        return tuple(dict.fromkeys(label(entry) for entry in self.faults))
+
+    def cells(self, seed: int, repeat: int = 1) -> list[Cell]:
+        """Return all flights, the one without a fault first; seed: of random faults.
+
+        repeat: number of flights per fault and moment.
+        """
+        found = [Cell(NOMINAL, "", Schedule(seed=seed))]
+        if self.draws:
+            return found + [self._drawn(seed, number) for number in range(self.draws)]
+        own = self.own_moments or ((),) * len(self.faults)
+        for entry, promised, chosen in zip(self.faults, self.promises, own, strict=True):
+            for moment, when in self.moments.items():
+                if chosen and moment not in chosen:
+                    continue
+                one = timed({**entry, **when}, None, moment)
+                found += [Cell(label(entry), moment, Schedule((one,), seed), promised)] * repeat
+        return found
+
+    def _drawn(self, seed: int, number: int) -> Cell:
+        """Return the random flight of this number: it does not depend on how many are drawn."""
+        random = np.random.default_rng([seed, number])
+        several = 2 if len(self.faults) > 1 and random.random() < PAIRS else 1
+        faults, moments = [], []
+        for row in random.choice(len(self.faults), several, replace=False).tolist():
+            own = self.own_moments[row] or tuple(self.moments)
+            moments.append(own[random.integers(len(own))])
+            entry = {**self.faults[row], **self.moments[moments[-1]]}
+            if self.durations and "duration" not in entry:
+                lasting = self.durations[random.integers(len(self.durations))]
+                entry |= {} if lasting is None else {"duration": lasting}
+            entry = {key: _between(value, random) for key, value in entry.items()}
+            faults.append(timed(entry, None, moments[-1]))
+        name = faults[0].fault.NAME + (AND if several > 1 else "")
+        return Cell(name, moments[0], Schedule(tuple(faults), seed))
+
+
+def _between(value: Any, random: np.random.Generator) -> Any:
+    """Return a number between both of [low, high], any other value as it is."""
+    return round(float(random.uniform(*value)), 3) if isinstance(value, list) else value
+
+
+def label(entry: dict[str, Any]) -> str:
+    """Return a row's name: the fault, its duration, and the given parameters."""
+    shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
+    lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
+    values = ", ".join(
+        f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}" for k, v in shown.items()
+    )
+    return entry["fault"] + lasting + (f" ({values})" if values else "")
+
+
+def read(
+    file: Path,
+    engine: str,
+    only: Collection[str] = (),
+    moments: Sequence[str] = (),
+    scenario: str | None = None,
+    vehicle: VehicleDescription | None = None,
+    draws: int = 0,
+) -> Matrix:
+    """Read a matrix for an engine. Raises FaultError, ConfigurationError, ScenarioError.
+
+    only: names of faults, () for all; moments: names of columns, () for all; scenario: instead of
+    the file's; vehicle: None for the default one; draws: see `Matrix`.
+    """
+    document = _document(file)
+    name = scenario or str(document["scenario"])
+    lasting, where = document.get(DURATIONS, []), str(file)
+    if not isinstance(lasting, list):
+        raise FaultError(f"{where}: {DURATIONS}: a list of times [s] expected, null for good")
+    times = _moments(document["moments"], load_scenario(name, vehicle), where, draws)
+    entries = listed(document["faults"], where)
+    longer = [
+        dict(entry) if one is None else {**entry, "duration": one}
+        for entry in entries
+        for one in (lasting if lasting and "duration" not in entry else [entry.get("duration")])
+    ]
+    checked = [_checked(entry, where, times, draws) for entry in longer]
+    rows = [_checked(dict(entry), where, times, draws) for entry in entries] if draws else checked
+    for given, known in ((only, FAULTS), (moments, times)):
+        for one in given:
+            if one not in known:
+                raise FaultError(
+                    f"unknown {'fault' if given is only else 'moment'} '{one}'; "
+                    f"there are: {', '.join(known)}"
+                )
+    selected = [row for row in rows if not only or row.entry["fault"] in only]
+    out = [label(row.entry) for row in selected if engine == "direct" and needs_nodes(row.fault)]
+    kept = [row for row in selected if label(row.entry) not in out]
+    if not kept:
+        raise FaultError(f"{file}: nothing to fly with the {engine} engine")
+    chosen = {k: v for k, v in times.items() if not moments or k in moments}
+    entries, promises = tuple(row.entry for row in kept), tuple(row.promise for row in kept)
+    own = tuple(row.moments for row in kept)
+    drawn = (draws, tuple(lasting)) if draws else ()
+    return Matrix(name, chosen, entries, promises, tuple(out), own, *drawn)
+
+
+def _document(file: Path) -> dict[str, Any]:
+    document = yaml_file.read(file, FaultError)
+    if not isinstance(document, dict) or sorted({*document} - {DURATIONS}) != sorted(KEYS):
+        raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
+    return document
+
+
+def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, Any]]:
+    """Yield the entry with the low and with the high end of each value [low, high]."""
+    ranges = {key: value for key, value in entry.items() if isinstance(value, list)}
+    for key, value in ranges.items():
+        numbers = all(isinstance(one, int | float) for one in value)
+        if not draws or len(value) != 2 or not numbers or not value[0] <= value[1]:
+            only = "two numbers [low, high] expected" if draws else "a range needs --draws"
+            raise FaultError(f"{where}: {key}: {value!r}: {only}")
+    for end in range(2 if ranges else 1):
+        yield entry | {key: value[end] for key, value in ranges.items()}
+
+
+def _moments(given: Any, scenario: Scenario, where: str, draws: int) -> dict[str, dict[str, Any]]:
+    """Return the checked times of the moments; they are written like times of faults."""
+    if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
+        raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
+    any_fault = next(iter(FAULTS))
+    for name, when in given.items():
+        at = f"{where}: moments: {name}"
+        for one in _ends(when, draws, at):
+            timed({**one, "fault": any_fault}, scenario.phase_names, at)
+    return {str(name): when for name, when in given.items()}
+
+
+class _Row(NamedTuple):
+    entry: dict[str, Any]
+    fault: Fault
+    promise: Promise | None
+    moments: tuple[str, ...]
+
+
+def _checked(entry: dict[str, Any], where: str, moments: Collection[str], draws: int = 0) -> _Row:
+    for key in ("at", "after"):
+        if key in entry:
+            raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
+    promised, own = entry.pop("promise", None), entry.pop("moments", [])
+    known = tuple(moments)  # what is asked may not be hashable
+    if not isinstance(own, list) or not all(one in known for one in own):
+        raise FaultError(f"{where}: moments: a list of {', '.join(moments)} expected, got {own!r}")
+    fault = [timed({**one, "at": 0.0}, {}, where).fault for one in _ends(entry, draws, where)][0]
+    promise = None if promised is None else read_promise(promised, where)
+    return _Row(entry, fault, promise, tuple(own))

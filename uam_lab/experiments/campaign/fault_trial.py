@@ -1,0 +1,90 @@
+"""One flight of a fault matrix, and its result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from uam_lab.experiments.campaign.fault_matrix import Cell
+from uam_lab.experiments.campaign.fault_outcome import (
+    COMPLETED,
+    LOST,
+    classify,
+    down_after,
+    ending,
+)
+from uam_lab.experiments.campaign.trial import Trial, figures_of, fly
+from uam_lab.records.results.outcome import Outcome
+
+
+@dataclass(frozen=True)
+class FaultTrial:
+    """One flight, and its cell of the matrix."""
+
+    cell: Cell
+    trial: Trial
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """Result of one flight. why: unmet criteria of a completed mission, notes of the flight.
+
+    down_after_s: from the fault to the final touchdown, None if the mission was completed or
+    without touchdown. kept: whether the promise was kept, None without a promise. worst: largest
+    errors of the flight, with the keys of `max` in metrics.json. happened: the injected faults, see
+    `faults.timeline.record`. given: the faults as option texts; tilt_deg: the largest; impact:
+    speed at the ground [m/s]; None without a recording.
+    """
+
+    fault: str
+    moment: str
+    outcome: str
+    why: str
+    duration_s: float
+    worst: Mapping[str, list[float | None]] = field(default_factory=dict)
+    happened: tuple[dict[str, Any], ...] = ()
+    down_after_s: float | None = None
+    kept: bool | None = None
+    given: str = ""
+    tilt_deg: float | None = None
+    impact: float | None = None
+
+
+def measure(flight: FaultTrial) -> FaultResult:
+    """Fly a trial; return its result. Raises ConfigurationError, ScenarioError."""
+    outcome = fly(flight.trial)
+    if outcome.series is None:
+        return judged(flight.cell, outcome, None)
+    return judged(flight.cell, outcome, figures_of(flight.trial, outcome, outcome.reason))
+
+
+def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> FaultResult:
+    """Return the result of a flight; figures: its metrics, None without a recording."""
+    series, promise = outcome.series, cell.promise
+    given = " ".join(one.text for one in cell.schedule.faults)
+    if series is None or figures is None:
+        broken = None if promise is None else False
+        return FaultResult(
+            cell.fault, cell.moment, LOST, outcome.reason, 0.0, kept=broken, given=given
+        )
+    end, came_to = ending(series), classify(series, figures)
+    begun = min((one["begin_s"] for one in outcome.faults), default=math.nan)
+    unknown = came_to == COMPLETED or math.isnan(begun)
+    down = None if unknown else down_after(series, begun)
+    why = "; ".join([*figures["shortfalls"], *outcome.notes])
+    return FaultResult(
+        fault=cell.fault,
+        moment=cell.moment,
+        outcome=came_to,
+        why=why,
+        duration_s=figures["duration_s"],
+        down_after_s=down,
+        kept=None if promise is None else promise.kept(came_to, down, why),
+        worst=figures["max"],
+        happened=tuple(outcome.faults),
+        given=given,
+        tilt_deg=math.degrees(end.largest_tilt),
+        impact=end.impact,
+    )

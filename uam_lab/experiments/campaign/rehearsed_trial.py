@@ -1,0 +1,82 @@
+"""One rehearsal of a matrix of cable faults, and its result."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+from uam_lab.experiments.campaign import fault_trial
+from uam_lab.experiments.campaign.fault_matrix import Cell
+from uam_lab.experiments.campaign.fault_outcome import LOST, REFUSED
+from uam_lab.experiments.campaign.fault_trial import FaultResult
+from uam_lab.flights.observer import Observer
+from uam_lab.flights.processes.interrupts import Interrupts
+from uam_lab.flights.rehearsal.flown_rehearsal import fly
+from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
+from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.records.results.outcome import Outcome
+from uam_sim_bridge.faults.feasibility import REHEARSAL
+from uam_sim_bridge.faults.schedule import FROM_START
+
+
+@dataclass(frozen=True)
+class RehearsedTrial:
+    """One cell of the matrix; lab: name or file; kept: folder of flights that broke a promise."""
+
+    cell: Cell
+    lab: str
+    scenario: str
+    seed: int
+    kept: Path
+    engine: ClassVar[str] = REHEARSAL  # as `flying` asks a Trial
+    keep: ClassVar[None] = None
+
+
+def measure(trial: RehearsedTrial) -> FaultResult:
+    """Rehearse a trial; return its result. Raises ConfigurationError, ScenarioError, LabError.
+
+    Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
+    """
+    cell = trial.cell
+    lab = replace(load_lab(trial.lab), scenario=trial.scenario)
+    settings = settings_of(lab)
+    options = RehearsalOptions(
+        seed=trial.seed,
+        payload_mass=settings.payload_mass,
+        faults=cell.schedule,
+        arm_start=tuple(settings.scenario.arm_start),
+        checklist=with_checklist(cell),
+    )
+    with tempfile.TemporaryDirectory(prefix="uam-rehearsal-") as folder, Interrupts() as stop:
+        out = Path(folder) / "flight"
+        made = replace(settings, out=out, seed=trial.seed, faults=cell.schedule)
+        _, outcome, figures = fly(lab, made, options, Observer(), stop)
+        if stop.raised:
+            raise KeyboardInterrupt
+        result = judged(cell, outcome, figures)
+        if result.kept is False:
+            name = f"{cell.fault} {cell.moment}".replace(" ", "_").replace("/", "_")
+            shutil.copytree(out, trial.kept / name, symlinks=True, dirs_exist_ok=True)
+    return result
+
+
+def with_checklist(cell: Cell) -> bool:
+    """Return whether a person does the lists: for the wiring, and without a fault."""
+    faults = cell.schedule.faults
+    return not faults or any(one.at == FROM_START for one in faults)
+
+
+def judged(cell: Cell, outcome: Outcome, figures: dict | None) -> FaultResult:
+    """Return the result of a rehearsal; figures: its metrics, None without a recording."""
+    if not outcome.failure.startswith(REFUSAL):
+        return fault_trial.judged(cell, outcome, figures)
+    promise = cell.promise
+    flown = outcome.series is not None and bool(outcome.series.flown.any())
+    ending = LOST if flown else REFUSED
+    kept = None if promise is None else promise.kept(ending, None, outcome.failure)
+    return FaultResult(cell.fault, cell.moment, ending, outcome.failure, 0.0, kept=kept)

@@ -1,0 +1,237 @@
+"""One flight of a campaign, in either engine, and its result."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, coordinates
+from uam_control.mission import Scenario, load_scenario
+from uam_control.profiles.profile import Profile
+from uam_lab.experiments.campaign.carried import Carried
+from uam_lab.experiments.campaign.fault_outcome import COMPLETED, LOST, classify, explained
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.direct.warm_up import prepare
+from uam_lab.flights.flight_settings import ONLOOKERS, FlightSettings
+from uam_lab.flights.observer import Observer
+from uam_lab.flights.processes.interrupts import Interrupts
+from uam_lab.records.results import metrics
+from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.results.timeseries import Series
+from uam_sim_bridge.faults import PROCESS, Schedule
+from uam_sim_bridge.plant import Vehicle
+
+
+class TrialFailed(RuntimeError):
+    """The flight ended with a failure; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One flight of the profile's vehicle.
+
+    label: its row in the tables; keep: file for its time series, if any; carried: for a worker
+    without this machine's files.
+    """
+
+    label: str
+    profile: Profile
+    payload_mass: float  # [kg]
+    seed: int
+    scenario: str = "pick_and_place"  # name or file
+    vehicle_changes: dict[str, object] = field(default_factory=dict)
+    keep: Path | None = None
+    faults: Schedule = Schedule()
+    engine: str = "direct"
+    clock: str = "lockstep"
+    carried: Carried | None = None
+
+    def load_scenario(self) -> Scenario:
+        """Return the scenario, for the vehicle; it is read once. Raises ScenarioError."""
+        return self._scenario
+
+    @cached_property
+    def _scenario(self) -> Scenario:
+        if self.carried is not None and self.carried.scenario is not None:
+            return self.carried.scenario
+        return load_scenario(self.scenario, self.profile.vehicle)
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """Result of a flight. rms, largest (6 + n,): errors of the `coordinates`, in m and
+    deg, NaN without a take-off.
+
+    flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
+    `fault_outcome.OUTCOMES`; why: see `fault_outcome.explained`. restless: RMS change from
+    tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
+    peaks: the largest value of each adaptation column.
+    """
+
+    label: str
+    payload_mass: float
+    seed: int
+    rms: np.ndarray
+    largest: np.ndarray
+    flown: float
+    cut_short: bool
+    outcome: str
+    why: str
+    place_error: float | None
+    restless: tuple[float, float]
+    peaks: dict[str, float]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries of rms and largest."""
+        return coordinates(len(self.rms) - ALPHA)
+
+    @property
+    def completed(self) -> bool:
+        """Whether the mission was completed."""
+        return self.outcome == COMPLETED
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle fell, landed hard or was out of control."""
+        return self.outcome == LOST
+
+
+def fly(trial: Trial) -> Outcome:
+    """Fly a trial, without log and output. Raises ConfigurationError, ScenarioError."""
+    scenario = trial.load_scenario()
+    if trial.engine == "ros":
+        return _fly_nodes(trial, scenario)
+    vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
+    flight = DirectFlight(
+        scenario, trial.profile, vehicle, trial.payload_mass, trial.seed, trial.faults
+    )
+    recording = flight.run()
+    return Outcome(
+        series=recording.series({"controller": trial.label}) if recording.count else None,
+        abort_reason=flight.mission.output.abort_reason,
+        failure=flight.ended_by,
+        transitions=transitions(flight.mission.changes),
+        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
+        faults=flight.fault_records,
+    )
+
+
+def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
+    """Fly a trial with nodes, topics and MAVLink, as `uam fly` does.
+
+    Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
+    """
+    from uam_lab.flights.ros import engine
+
+    needed = {one.fault.values["node"] for one in trial.faults.only(PROCESS).faults}
+    settings = FlightSettings(
+        scenario=scenario,
+        profile=trial.profile,
+        vehicle=trial.profile.vehicle,
+        clock=trial.clock,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        scenario_source=trial.scenario,
+        vehicle_changes=trial.vehicle_changes,
+        without=tuple(name for name in ONLOOKERS if name not in needed),
+        faults=trial.faults,
+    )
+    prepare()
+    with tempfile.TemporaryDirectory(prefix="uam-flight-") as folder, Interrupts() as stop:
+        outcome = engine.fly(settings, ResultFolder(Path(folder)), Observer(), stop)
+    if stop.raised:
+        raise KeyboardInterrupt
+    if outcome.series is not None:
+        outcome.series.info["controller"] = trial.label
+    return outcome
+
+
+def recorded(trial: Trial) -> Outcome:
+    """Fly a trial, as `fly`; return its outcome, which has a series.
+
+    Raises TrialFailed if nothing was recorded, or if a flight with the nodes failed.
+    """
+    outcome = fly(trial)
+    if outcome.series is None or (trial.engine == "ros" and outcome.partial):
+        raise TrialFailed(
+            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
+            f"{outcome.reason or 'nothing was recorded'}"
+        )
+    return outcome
+
+
+def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, Any]:
+    """Return the content of metrics.json for a flight with a recorded series."""
+    scenario = trial.load_scenario()
+    info = {
+        "payload_mass_kg": trial.payload_mass,
+        "drop_point": scenario.drop_point,
+        "landing_point": scenario.landing_point,
+        "abort_reason": abort_reason,
+        "transitions": outcome.transitions,
+        "grasps": outcome.grasps,
+        "faults": outcome.faults,
+    }
+    return metrics.compute(outcome.series, info)
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Fly a trial; return its result and write its series to `trial.keep` if given.
+
+    Raises TrialFailed as `recorded`.
+    """
+    outcome = recorded(trial)
+    series = outcome.series
+    if trial.keep is not None:
+        series.write(trial.keep)
+    figures = figures_of(trial, outcome, outcome.abort_reason)
+    flown, landing = series.flown, trial.load_scenario().landing
+    end = classify(series, figures)
+    return TrialResult(
+        label=trial.label,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        rms=_row(figures["rms"]),
+        largest=_row(figures["max"]),
+        flown=min(1.0, figures["duration_s"] / (landing.at + landing.duration)),
+        cut_short=not bool(series.in_phase("landed").any()),
+        outcome=end,
+        why=explained(end, figures),
+        place_error=figures["payload_place_error_m"],
+        restless=(_change(_rates(series)[flown]), _change(series.block("tau_alpha.")[flown])),
+        peaks=_peaks(series, flown),
+    )
+
+
+def _row(groups: dict[str, list[float | None]]) -> np.ndarray:
+    values = [value for key, _, _ in metrics.GROUPS for value in groups[key]]
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _rates(series: Series) -> np.ndarray:
+    """Body rates (ticks, 3) [rad/s] that were sent; those of the vehicle where none were."""
+    sent = series.block("setpoint.rate_")
+    own = np.column_stack([series[f"truth.{axis}_dot"] for axis in ("roll", "pitch", "yaw")])
+    return own if np.isnan(sent).all() else sent
+
+
+def _change(values: np.ndarray) -> float:
+    """Return the RMS change of values (ticks, n) per tick, over all columns; 0 for one tick."""
+    return float(np.sqrt(np.mean(np.square(np.diff(values, axis=0))))) if len(values) > 1 else 0.0
+
+
+def _peaks(series: Series, flown: np.ndarray) -> dict[str, float]:
+    where = series.columns.block("adaptation.")
+    values = np.abs(series.values[flown, where])
+    return {
+        name.removeprefix("adaptation."): float(np.nanmax(column))
+        for name, column in zip(series.columns.names[where], values.T, strict=True)
+        if not np.isnan(column).all()
+    }

@@ -1,0 +1,167 @@
+"""Random variations of the nominal flight, for robustness statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.profiles.profile import Profile
+from uam_control.settings.configuration import path
+from uam_control.settings.section import read_section
+from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.flights.flight_settings import LAST_SEED
+from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
+from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.presets import Effects
+
+NAMES = ("payload", "payload_offset", "wind", "gust", "noise", "mass", "inertia", "efficiency")
+FACTORS = ("mass", "inertia", "efficiency")  # of which 0 leaves no vehicle that flies
+PER_SEED = 100_000  # numbers of flights apart from each other: seed of flight i is seed * this + i
+DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  # optional, [s]
+
+
+class VariationError(ValueError):
+    """The file of ranges is not usable; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One random flight. values: name → number, for the statistics; trial: the flight."""
+
+    values: dict[str, float]
+    trial: Trial
+
+
+def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
+    """Return lowest and highest value of each variation; default: campaign/robustness.yaml.
+
+    Raises VariationError if an entry is missing, unknown, or no pair of increasing numbers that
+    are not below 0.
+    """
+    file = file or path("campaign/robustness.yaml")
+    top = read_section(file, VariationError)
+    known = set(NAMES) | set(DELAYS)
+    if not set(NAMES) <= set(top.values) <= known:
+        raise VariationError(
+            f"{file}: expected are {', '.join(NAMES)} and, if wanted, {', '.join(DELAYS)}"
+        )
+    found = {}
+    for name in top.values:
+        found[name] = low, high = top.numbers(name, 2)
+        if not 0.0 <= low <= high or (name in FACTORS and low == 0.0):
+            above = "above 0" if name in FACTORS else "0 or more"
+            raise top.error(name, f"[least, largest] expected, {above}: [{low:g}, {high:g}]")
+    return found
+
+
+@dataclass(frozen=True)
+class Draws(Sequence[Draw]):
+    """Random flights, drawn when they are looked at. Flight i depends on the seed and i, not on
+    `total`.
+
+    ranges: name → lowest and highest value; effects: of the plant, in every flight.
+    """
+
+    profile: Profile
+    total: int
+    seed: int
+    ranges: dict[str, tuple[float, float]]
+    scenario: str = "pick_and_place"
+    effects: Effects = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raise VariationError if a flight's seed would be too large."""
+        if self.seed * PER_SEED + self.total - 1 > LAST_SEED:
+            most = (LAST_SEED + 1 - self.total) // PER_SEED
+            raise VariationError(
+                f"seed {self.seed}: with {self.total} flights 0 to {most} are allowed"
+            )
+
+    def __len__(self) -> int:
+        """Return the number of flights."""
+        return self.total
+
+    def __getitem__(self, number: int) -> Draw:
+        """Return flight `number`. Raises IndexError."""
+        if not 0 <= number < self.total:
+            raise IndexError(number)
+        random = np.random.default_rng([self.seed, number])
+        seed = self.seed * PER_SEED + number
+        return _one(self.profile, self.scenario, random, seed, self.ranges, self.effects)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the drawn values."""
+        return (*NAMES, *(name for name in DELAYS if name in self.ranges))
+
+    def chosen(self, numbers: str) -> Sequence[int]:
+        """Return these numbers of flights, as "3,14", counted from 0; all for "".
+
+        Raises VariationError for another text or a number beyond the draws.
+        """
+        if not numbers:
+            return range(self.total)
+        wanted = numbers.split(",")
+        if not all(one.isdecimal() and int(one) < self.total for one in wanted):
+            raise VariationError(f"--draws {numbers}: numbers of 0 to {self.total - 1}, as 3,14")
+        return sorted({int(one) for one in wanted})
+
+
+def _one(
+    profile: Profile,
+    scenario: str,
+    random: np.random.Generator,
+    seed: int,
+    allowed: dict[str, tuple[float, float]],
+    effects: Effects,
+) -> Draw:
+    drawn = {name: float(random.uniform(*allowed[name])) for name in NAMES}
+    direction = random.uniform(0.0, 2.0 * np.pi)
+    efficiency = random.uniform(*allowed["efficiency"], size=len(profile.vehicle.rotors))
+    offset = random.uniform(0.0, 2.0 * np.pi)
+    speed, away = drawn["wind"], drawn["payload_offset"]
+    drawn["efficiency"] = float(efficiency.min())
+    drawn |= {name: float(random.uniform(*allowed[name])) for name in DELAYS if name in allowed}
+    given = late(*(drawn.get(name, 0.0) for name in DELAYS))
+    faults = tuple(timed(parse_spec(text), {}, "delays") for text in given)
+    changes = {
+        "air.wind": [float(speed * np.cos(direction)), float(speed * np.sin(direction)), 0.0],
+        "air.gust": drawn["gust"] * speed,
+        "sensors.noise_scale": drawn["noise"],
+        "variation.mass": drawn["mass"],
+        "variation.inertia": drawn["inertia"],
+        "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
+        "rotors.efficiency": efficiency.tolist(),
+    }
+    changes = presets.added(changes, effects)
+    trial = Trial(
+        "random",
+        profile,
+        drawn["payload"],
+        seed,
+        scenario,
+        vehicle_changes=changes,
+        faults=Schedule(faults, seed),
+    )
+    return Draw(drawn, trial)
+
+
+def common(
+    values: Mapping[str, np.ndarray], failed: np.ndarray
+) -> list[tuple[str, float, float, float]]:
+    """Compare failed and other flights: (name, mean of the failed, of the others, distance).
+
+    values: drawn value of each flight, by name; failed: mask. distance: of the two means, in
+    standard deviations over all flights; the largest comes first.
+    """
+    if not failed.any() or failed.all():
+        return []
+    found = []
+    for name, drawn in values.items():
+        spread = float(drawn.std())
+        lost, kept = float(drawn[failed].mean()), float(drawn[~failed].mean())
+        found.append((name, lost, kept, (lost - kept) / spread if spread else 0.0))
+    return sorted(found, key=lambda entry: -abs(entry[3]))

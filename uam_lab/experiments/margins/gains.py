@@ -1,0 +1,48 @@
+"""Adapted gains for the linear model: those of the profile, and those of a flight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uam_control.laws import catalogue
+from uam_control.laws.modular import ZETA
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import Profile
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
+from uam_sim_bridge.plant import Vehicle
+
+PERCENTILE = 95.0
+
+
+def fly(profile: Profile, vehicle: Vehicle, scenario: str, payload_mass: float) -> Series:
+    """Return a flight of the direct engine, seed 1; payload_mass [kg]."""
+    loaded = load_scenario(scenario, vehicle.description)
+    flight = DirectFlight(loaded, profile, vehicle, payload_mass, seed=1)
+    flight.run()
+    return flight.recording.series({})
+
+
+def flown_gains(profile: Profile, series: Series) -> dict[str, np.ndarray]:
+    """Return the gains of each subsystem in a flight, for the model.
+
+    The modular law has the gain rho / max(||r||, varpi) on r, the model rho / varpi: its rho is the
+    95th percentile of rho varpi / max(||r||, varpi) in flight. K0 alone gives it, because the other
+    terms depend on the motion. Of the other laws each gain is the median.
+    """
+    found = {}
+    for subsystem in SUBSYSTEMS:
+        parameters = profile.sets[f"{subsystem}_controller"]
+        names = catalogue.law(parameters.law).gain_names(len(parameters.inertia))
+        rows = series.values[series.flown][:, gain_columns(subsystem, names, series.columns)]
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if not len(rows):
+            continue
+        if parameters.law != catalogue.DEFAULT:
+            found[subsystem] = np.median(rows, axis=0)
+            continue
+        zeta = float(np.median(rows[:, ZETA]))
+        layer = np.maximum(rows[:, names.index("r_norm")] / parameters.varpi, 1.0)
+        rho = float(np.percentile(rows[:, names.index("rho")] / layer, PERCENTILE))
+        found[subsystem] = np.array([max(rho - zeta, 0.0), 0.0, 0.0, 0.0, zeta])
+    return found

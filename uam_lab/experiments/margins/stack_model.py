@@ -1,0 +1,153 @@
+"""Linear model of the stack around hover, from the objects of a flight of the direct engine.
+
+| block | object |
+|---|---|
+| IMU, joints: latency | numbers of the vehicle |
+| estimate of base | exact: IMU and motion capture agree (`estimator_margin` for the rest) |
+| estimate of joints | `StateEstimator.joints` |
+| laws, desired attitude, map to body rates and thrust | stages of `ControlTick`, `RateThrustMap` |
+| rate loop, allocation | `Autopilot.rate_loop` |
+| rotors, rigid bodies, servos | `plant_model` |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
+from uam_control.frames import swap_body
+from uam_control.laws.asmc1 import Asmc1Parameters
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import CONTROLLERS, Profile
+from uam_control.stages.control_tick import control_arm, control_attitude, control_position
+from uam_lab.experiments.margins.linear import LinearBlock, delay, linearise
+from uam_lab.experiments.margins.plant_model import Hover, plant_model
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_sim_bridge.plant import Vehicle
+
+RATES = ("setpoint.roll", "setpoint.pitch", "setpoint.yaw")  # body rates [rad/s, FLU]
+THRUST = "setpoint.thrust"
+Gains = Mapping[str, np.ndarray]  # subsystem → adapted gains, the first values of its `adaptation`
+
+
+@dataclass(frozen=True)
+class Stack:
+    """All blocks of vehicle and stack; period [s] of the ticks; names of chi's coordinates."""
+
+    blocks: tuple[LinearBlock, ...]
+    period: float
+    coordinates: tuple[str, ...]
+
+
+def stack_model(
+    profile: Profile,
+    vehicle: Vehicle,
+    payload_mass: float = 0.0,
+    arm: Sequence[float] | None = None,
+    gains: Gains | None = None,
+    late_setpoints: int = 0,
+    dry: bool = True,
+) -> Stack:
+    """Return the linear model in hover.
+
+    payload_mass [kg] on the magnet; arm (n,) [rad], None: stowed; gains: None for the initial ones;
+    late_setpoints [ticks]: more delay of the setpoints on their way to the autopilot;
+    dry: see `plant_model`.
+    """
+    # Adaptation is slow, and its gains are given. That of ASMC-1 is the integral of s: linear.
+    sets = profile.sets | {
+        node: replace(found := profile.sets[node], adapt=found.law == Asmc1Parameters.law)
+        for node in CONTROLLERS
+    }
+    described, numbers = vehicle.description, vehicle.numbers
+    scenario = load_scenario("hover", described)
+    flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)
+    plant, hover = plant_model(vehicle, payload_mass, described.stowed if arm is None else arm, dry)
+    names = described.coordinates
+    base = tuple(f"{name}{end}" for end in ("", "_dot") for name in names[: ARM.start])
+    sensors = numbers["sensors"]
+    blocks = (
+        plant,
+        delay(_of("true", base), _of("state", base), sensors["imu"]["latency_ticks"]),
+        *_joints(flight, names[ARM], sensors["joints"]["latency_ticks"]),
+        _laws(flight, names, hover, gains or {}),
+        delay((*RATES, THRUST), _of("arrived", (*RATES, THRUST)), late_setpoints),
+        _autopilot(flight, hover),
+    )
+    return Stack(blocks, described.control_period, names)
+
+
+def _of(stage: str, names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{stage}.{name}" for name in names)
+
+
+def _joints(flight: DirectFlight, names: Sequence[str], latency: int) -> tuple[LinearBlock, ...]:
+    """Return latency and observer of the joints: true.<joint> → state.<joint>, with rates."""
+    estimator, n = flight.control.estimator.estimator, len(names)
+    both = (*names, *(f"{name}_dot" for name in names))
+    period, ticks = flight.plant.period, 0
+
+    def step(given: np.ndarray) -> np.ndarray:
+        nonlocal ticks
+        ticks += 1
+        estimator.joints(ticks * period, given[:n], given[n:])
+        state = estimator.update()
+        return np.concatenate([state[CHI, ARM], state[CHI_DOT, ARM]])
+
+    step(np.zeros(2 * n))
+    block = linearise(step, [estimator], _of("read", both), _of("state", both))
+    return delay(_of("true", both), _of("read", both), latency), block
+
+
+def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains) -> LinearBlock:
+    """Return the three laws and the map: state → setpoint, effort."""
+    control, signals, size = flight.control, flight.control.signals, len(names)
+    signals.flying, weight = True, hover.weight
+    period = round(flight.plant.period * 1e9)
+
+    def step(given: np.ndarray) -> np.ndarray:
+        signals.stamp += period
+        signals.state[CHI], signals.state[CHI_DOT] = given[:size], given[size:]
+        control_position(control)
+        control_attitude(control)
+        control_arm(control)
+        rates, thrust = control.bridge.map.map(
+            signals.tau_p, signals.tau_q, signals.state[CHI, ATTITUDE], given[size:][ATTITUDE]
+        )
+        return np.concatenate([rates, [thrust], signals.tau_alpha])
+
+    still = np.zeros(2 * size)
+    step(still)
+    # thrust of the operating point: the payload's weight as desired acceleration
+    signals.reference[CHI_DDOT, Z] = (weight - signals.tau_p[2]) * (
+        1.0 / flight.control.position.controller.parameters.inertia[2]
+    )
+    for subsystem, values in gains.items():
+        control.laws[subsystem].controller.law.adaptation[: len(values)] = values
+    step(still)
+    laws = [stage.controller for stage in control.laws.values()]
+    inputs = _of("state", (*names, *(f"{name}_dot" for name in names)))
+    outputs = (*RATES, THRUST, *_of("effort", names[ARM]))
+    return linearise(step, laws, inputs, outputs)
+
+
+def _autopilot(flight: DirectFlight, hover: Hover) -> LinearBlock:
+    """Return the autopilot's rate loop: arrived setpoint, gyro → motor commands."""
+    autopilot, period = flight.autopilot.autopilot, flight.plant.period
+    rates, thrust = flight.control.bridge.map.map(
+        np.array([0.0, 0.0, hover.weight]), np.zeros(3), np.zeros(3), np.zeros(3)
+    )
+    setpoint = np.zeros(4)
+
+    def step(given: np.ndarray) -> np.ndarray:
+        setpoint[:3], setpoint[3] = swap_body(given[:3]), given[3]
+        return autopilot.rate_loop(swap_body(given[3 + 1 :]), period, setpoint).copy()
+
+    at = np.array([*np.zeros(3), thrust, *np.zeros(3)])
+    inputs = (*_of("arrived", (*RATES, THRUST)), "true.roll_dot", "true.pitch_dot", "true.yaw_dot")
+    outputs = tuple(f"motor.{i + 1}" for i in range(len(autopilot.motors)))
+    step(at)
+    return linearise(step, [autopilot], inputs, outputs, at)

@@ -1,0 +1,169 @@
+"""The description of a study: a file of config/studies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Any
+
+from uam_control.laws import catalogue
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
+from uam_control.vehicle import VehicleDescription, load_description
+from uam_lab.records.results.timeseries import SUBSYSTEMS
+
+NOMINAL = "nominal"
+FROZEN = ("", "zero", "margin", "converged")
+KEYS = (
+    *("vehicle", "autopilot", "shared", "law_parameters", "modular_parameters", "feedback"),
+    *("spend", "margin_loads", "strengths", "scenario", "judged", "nominal", "seeds", "rows"),
+    *("conditions", "factors", "nominal_values", "adaptation", "ranges", "tuning"),
+    *("law_sweep", "arm_sweep"),
+)
+
+
+class StudyError(ValueError):
+    """The file of a study is not usable; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller. law: "" for `profiles` alone; frozen: one of FROZEN; own_autopilot: the
+    autopilot's own gains instead of the study's; common: one rate of adaptation for all subsystems;
+    conditions: those that it flies, () for all.
+    """
+
+    label: str
+    law: str = ""
+    frozen: str = ""
+    profiles: tuple[str, ...] = ()
+    own_autopilot: bool = False
+    common: bool = False
+    conditions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a flight differs in. of: the factor that is varied, value: its size.
+
+    vehicle: dotted changes of the plant's numbers; trajectory: changes of the scenario's.
+    """
+
+    label: str
+    vehicle: dict[str, Any]
+    trajectory: dict[str, Any]
+    of: str = ""
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study. document: the content of its file."""
+
+    name: str
+    document: dict[str, Any]
+    vehicle: VehicleDescription
+    rows: tuple[Row, ...]
+    conditions: tuple[Condition, ...]
+
+    def condition(self, label: str) -> Condition:
+        """Return the condition of this label."""
+        return next(one for one in self.conditions if one.label == label)
+
+    def without_integrators(self) -> VehicleDescription:
+        """Return the vehicle with the study's gains of the autopilot."""
+        gains = self.vehicle.autopilot_gains | self.document["autopilot"]
+        return replace(self.vehicle, autopilot_gains=gains)
+
+    def with_adaptation(self, law: str, values: Mapping[str, float]) -> Study:
+        """Return the study with other numbers of a law's adaptation."""
+        document = deepcopy(self.document)
+        document["adaptation"][law] |= values
+        return replace(self, document=document)
+
+    def scenario(self, condition: Condition) -> dict[str, Any]:
+        """Return the document of the condition's scenario."""
+        document = deepcopy(self.document["scenario"])
+        if condition.trajectory:
+            document["trajectory"] = document.get("trajectory", {}) | condition.trajectory
+        return document
+
+
+def load_study(name_or_file: str) -> Study:
+    """Read a study of config/studies, or a file. Raises StudyError, ConfigurationError."""
+    file = configuration.named("studies", name_or_file, suffixes=(".yaml",))
+    top = read_section(file, StudyError)
+    document = top.values
+    if set(document) != set(KEYS):
+        odd = sorted(set(KEYS) ^ set(document))
+        raise StudyError(f"{file}: {odd[0]}: missing, or no entry of a study")
+    _check(top)
+    given = top.section("rows")
+    rows = tuple(_row(given.section(label), label) for label in given.values)
+    base, varied = _mapping(top, "nominal"), _mapping(top, "conditions")
+    conditions = (
+        _condition(NOMINAL, base, Section({}, varied.where, StudyError)),
+        *(_condition(label, base, varied.section(label)) for label in varied.values),
+    )
+    known = {one.label for one in conditions}
+    for row in rows:
+        if strange := sorted(set(row.conditions) - known):
+            raise StudyError(f"{file}: {row.label}: no condition '{strange[0]}'")
+    return Study(file.stem, document, load_description(top.text("vehicle")), rows, conditions)
+
+
+def _mapping(section: Section, key: str) -> Section:
+    """Return the entry `key`, a mapping that may be empty or missing."""
+    if section.values.get(key, {}) == {}:
+        return Section({}, f"{section.where} {key}", StudyError)
+    return section.section(key)
+
+
+def _row(entry: Section, label: str) -> Row:
+    law, frozen = (entry.text(k) if k in entry.values else "" for k in ("law", "frozen"))
+    if law and law not in catalogue.LAWS:
+        raise entry.error("law", f"'{law}': {', '.join(catalogue.LAWS)} are allowed")
+    if frozen not in FROZEN:
+        raise entry.error("frozen", f"'{frozen}': {', '.join(FROZEN[1:])} are allowed")
+    profiles, conditions = (
+        entry.texts(k) if k in entry.values else () for k in ("profiles", "conditions")
+    )
+    if not law and not profiles:
+        raise StudyError(f"{entry.where}: a law or profiles expected")
+    return Row(
+        label,
+        law,
+        frozen,
+        profiles,
+        entry.values.get("autopilot") == "own",
+        "common" in entry.values and entry.switch("common"),
+        conditions,
+    )
+
+
+def _condition(label: str, base: Section, entry: Section) -> Condition:
+    vehicle, trajectory = (
+        _mapping(base, key).values | _mapping(entry, key).values
+        for key in ("vehicle", "trajectory")
+    )
+    factor = entry.text("of") if "of" in entry.values else ""
+    value = entry.number("value") if "value" in entry.values else 0.0
+    return Condition(label, vehicle, trajectory, factor, value)
+
+
+def _check(top: Section) -> None:
+    if set(top.section("feedback").values) != set(SUBSYSTEMS):
+        raise top.error("feedback", f"{', '.join(SUBSYSTEMS)} expected")
+    if not 0.0 < top.number("spend") < 1.0:
+        raise top.error("spend", f"{top.number('spend')} is outside 0 to 1")
+    top.whole("seeds")
+    ranges, adaptation = top.section("ranges"), top.section("adaptation")
+    for law in ranges.values:
+        allowed, known = ranges.section(law), adaptation.section(law)
+        if set(allowed.values) != set(known.values):
+            raise ranges.error(law, "the entries of adaptation expected")
+        for name in known.values:
+            (low, high), value = allowed.numbers(name, 2), known.number(name)
+            if not 0.0 < low <= value <= high:
+                raise known.error(name, f"{value} is outside {low} to {high}")

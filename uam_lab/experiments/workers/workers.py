@@ -1,0 +1,211 @@
+"""Hands out items to worker processes and receives the results, in the order in which they come."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import queue
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from distributed import CancelledError, Client, Future
+from distributed.scheduler import KilledWorker
+
+from uam_lab.experiments.workers import task
+from uam_lab.experiments.workers.identity import identity
+from uam_lab.experiments.workers.local_cluster import local_cluster
+from uam_lab.experiments.workers.place import WorkersError, Workplace
+from uam_lab.experiments.workers.window import PER_WORKER, Window
+
+CONNECTING = 15.0  # [s] for the scheduler to answer
+GONE = 60.0  # [s] without the scheduler, after which the command ends
+RECEIVING = 20.0  # [s] for a result; after that its worker counts as lost
+POLL = 1.0  # [s] between two looks at the number of workers
+WAITING = 10.0  # [s] without a worker, after which the user is told
+
+
+@contextmanager
+def workers(
+    place: Workplace,
+    prepare: Callable[[], None] | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Iterator[Workers]:
+    """Yield the workers of a place. Raises WorkersError if there is no scheduler.
+
+    prepare: importable function that each worker calls once, before its first item. say: receives
+    the address of the dashboard, and when there is nobody to work.
+    """
+    with contextlib.ExitStack() as stack:
+        if place.scheduler:
+            client = stack.enter_context(_connected(place.scheduler))
+        else:
+            cluster = stack.enter_context(local_cluster(place.jobs))
+            client = stack.enter_context(Client(cluster, set_as_default=False))
+        say(f"dashboard {client.dashboard_link}")
+        yield Workers(client, prepare, say)
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    try:
+        client = _LimitedClient(address, timeout=CONNECTING, set_as_default=False)
+    except Exception as error:  # what answers may be anything: Dask raises different types
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise WorkersError(
+            f"scheduler {address}: {reason}; the address that `dask scheduler` prints is expected, "
+            "with its port, not the dashboard's"
+        ) from None
+    with client:
+        yield client
+
+
+class _LimitedClient(Client):
+    """Gives up on a port that accepts and stays silent: Dask's handshake has no time limit."""
+
+    async def _start(self, timeout: float, **options: Any) -> Client:
+        try:
+            return await asyncio.wait_for(super()._start(timeout=timeout, **options), timeout)
+        except Exception as error:
+            await self._close()  # else it complains when it is collected
+            if isinstance(error, TimeoutError) and not str(error):
+                raise TimeoutError(f"no answer within {timeout:g} s") from None
+            raise
+
+
+class Workers:
+    """Connected workers, see `workers`."""
+
+    def __init__(
+        self,
+        client: Client,
+        prepare: Callable[[], None] | None,
+        say: Callable[[str], None],
+    ) -> None:
+        self._client, self._prepare, self._say = client, prepare, say
+
+    def threads(self) -> int:
+        """Return the present number of threads of all workers."""
+        try:
+            return sum(self._client.nthreads().values())
+        except (OSError, TimeoutError):  # no scheduler at present
+            return 0
+
+    def completed(
+        self,
+        work: Callable[[Any], Any],
+        items: Iterable[Any],
+        per_worker: int = PER_WORKER,
+        idle: Callable[[], None] = lambda: None,
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield the number of an item and work(item), each item once, in the order of completion.
+
+        The items of a lost worker are computed again. idle: called about every second. Raises
+        what `work` raises, WorkersError if workers or scheduler cannot be used.
+        """
+        return _Run(self, self._client, self._prepare, self._say).completed(
+            work, Window(items, per_worker), idle
+        )
+
+
+class _Run:
+    """One call of `Workers.completed`."""
+
+    def __init__(
+        self,
+        crew: Workers,
+        client: Client,
+        prepare: Callable[[], None] | None,
+        say: Callable[[str], None],
+    ) -> None:
+        self._crew, self._client, self._prepare, self._say = crew, client, prepare, say
+        self._name = f"flight-{uuid.uuid4().hex[:8]}"
+        self._expected = identity()
+        self._futures: dict[int, Future] = {}
+        self._finished: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._submitted = 0
+        self._alive = self._looked = self._staffed = time.monotonic()
+        self._threads, self._told = 0, False
+
+    def completed(
+        self, work: Callable[[Any], Any], window: Window, idle: Callable[[], None]
+    ) -> Iterator[tuple[int, Any]]:
+        self._threads = self._crew.threads()
+        try:
+            while True:
+                if self._client.status == "closed":
+                    raise WorkersError("the connection to the scheduler is lost")
+                for number, item in window.fill(self._threads):
+                    self._submit(work, number, item)
+                if not window:
+                    return
+                received = self._receive(window)
+                if received is not None:
+                    yield received
+                if time.monotonic() - self._looked >= POLL:
+                    self._look()
+                    idle()
+        finally:
+            left = list(self._futures.values())
+            if left:
+                with contextlib.suppress(Exception):
+                    self._client.cancel(left, force=True)
+
+    def _submit(self, work: Callable[[Any], Any], number: int, item: Any) -> None:
+        self._submitted += 1
+        future = self._client.submit(
+            task.run,
+            work,
+            item,
+            self._expected,
+            self._prepare,
+            key=f"{self._name}-{self._submitted}",
+            pure=False,
+        )
+        self._futures[number] = future
+        future.add_done_callback(lambda _: self._finished.put(number))
+
+    def _receive(self, window: Window) -> tuple[int, Any] | None:
+        """Return number and result of an item; None if there is none yet, or if it was lost."""
+        try:
+            number = self._finished.get(timeout=POLL)
+        except queue.Empty:
+            return None
+        future = self._futures.pop(number)
+        if future.status == "error":
+            self._failed(future.exception(), window, number)
+            return None
+        try:
+            result = future.result(RECEIVING)
+        except (TimeoutError, CancelledError):  # its worker was lost with it
+            future.cancel()
+            self._failed(None, window, number)
+            return None
+        window.done(number)
+        return number, result
+
+    def _failed(self, error: BaseException | None, window: Window, number: int) -> None:
+        """Have a lost item computed again; raise every other error. error: None if it was lost."""
+        if error is None or isinstance(error, KilledWorker):
+            if not window.lost(number):
+                raise WorkersError(f"{number}: every worker that began it was lost")
+        elif isinstance(error, ModuleNotFoundError):
+            raise WorkersError(f"a worker cannot import {error.name}: install uam there") from error
+        else:
+            raise error
+
+    def _look(self) -> None:
+        """Notice a change of the number of workers, and a lost scheduler."""
+        now = self._looked = time.monotonic()
+        if self._client.status == "running":
+            self._alive = now
+            self._threads = self._crew.threads()
+        elif now - self._alive > GONE:
+            raise WorkersError("the connection to the scheduler is lost")
+        if self._threads:
+            self._staffed, self._told = now, False
+        elif now - self._staffed > WAITING and not self._told:
+            self._say("waiting for a worker")
+            self._told = True

@@ -1,3 +1,0 @@
-"""The ROS engine: each node runs in a separate process."""
-
-FORKER = "uam_lab.flight.ros.forker"  # module that prepares the process that forks the nodes

@@ -1,0 +1,85 @@
+"""One flight of the direct engine, with progress and outcome."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.maths.rotations import tilt, wrap_angle
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.flight_settings import AUTOPILOT_IMU, FlightSettings
+from uam_lab.flights.observer import FlightStatus, Observer
+from uam_lab.flights.processes.interrupts import StopRequest
+from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_sim_bridge.plant import Vehicle
+
+
+def fly(
+    settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+) -> Outcome:
+    """Fly until the mission is done or a stop is requested."""
+    observer.started(None)
+    vehicle = Vehicle.of(settings.vehicle).changed(settings.vehicle_changes)
+    flight = DirectFlight(
+        settings.scenario,
+        settings.profile,
+        vehicle,
+        settings.payload_mass,
+        settings.seed,
+        settings.faults,
+        settings.plant,
+        settings.imu == AUTOPILOT_IMU,
+    )
+    flight.say = observer.message
+    folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
+    begin = time.monotonic()
+    try:
+        flight.run(lambda *_: _report(flight, begin, observer, stop))
+    except _Stopped:
+        pass
+    output = flight.mission.output
+    return Outcome(
+        series=flight.recording.series() if flight.recording.count else None,
+        wall_s=time.monotonic() - begin,
+        abort_reason=output.abort_reason,
+        failure=flight.ended_by,
+        interrupted=stop.raised and not output.done,
+        transitions=transitions(flight.mission.changes),
+        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
+        faults=flight.fault_records,
+    )
+
+
+class _Stopped(Exception):
+    """A stop was requested."""
+
+
+def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRequest) -> None:
+    """Show where the flight is; called once a simulated second. Raises _Stopped."""
+    if stop.raised:
+        raise _Stopped
+    recording = flight.recording
+    if not recording.count:
+        return
+    row, output = recording.values[recording.count - 1], flight.mission.output
+    columns = recording.columns
+    size = columns.size
+    estimate = row[columns.block("estimate.")][:size]
+    error = estimate - row[columns.block("reference.")][:size]
+    error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
+    norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
+    wall = time.monotonic() - begin
+    observer.update(
+        FlightStatus(
+            phase=output.phase,
+            time=output.time,
+            position_error=norms[0] * output.flying,
+            attitude_error=norms[1] * output.flying,
+            tilt=tilt(estimate[ATTITUDE]),
+            arm_error=norms[2],
+            real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
+        )
+    )

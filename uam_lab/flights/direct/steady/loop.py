@@ -1,0 +1,217 @@
+"""The compiled loop over steady ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.estimation.estimator import write_biases
+from uam_control.maths.compiled import borrowing, inlined
+from uam_control.stamps import SECOND
+from uam_lab.flights.direct.record import MOTORS, RowLayout, record
+from uam_lab.flights.direct.steady.bridge import BridgeArrays, send, take_pose
+from uam_lab.flights.direct.steady.cycle import CycleArrays, cycle
+from uam_lab.flights.direct.steady.estimation import NOTHING, STEADY, Estimation, estimate
+from uam_lab.flights.direct.steady.inputs import (
+    BIAS,
+    JOINTS,
+    MOCAP,
+    PAYLOAD,
+    InputArrays,
+    read_inputs,
+)
+from uam_lab.flights.direct.steady.laws import (
+    ArmArrays,
+    AttitudeArrays,
+    PositionArrays,
+    Steps,
+    control,
+)
+from uam_lab.flights.direct.steady.memory import put
+from uam_lab.flights.direct.steady.places import (
+    AUTOPILOT,
+    BRIDGE,
+    DIVERGE,
+    END,
+    ERROR,
+    ESTIMATE,
+    LAWS,
+    LISTEN,
+    RECORD,
+    REFERENCE,
+    WATCH,
+)
+from uam_lab.flights.direct.steady.reference import ReferenceArrays, advance, watch_due
+from uam_lab.flights.direct.steady.sensing import (
+    PAYLOAD_POSE,
+    RING,
+    VEHICLE_POSE,
+    Sensing,
+    sense,
+    stamp_of,
+    step,
+)
+
+
+class TickArrays(NamedTuple):
+    """Arrays of all parts.
+
+    state (3, 6 + n): of the estimator; flown (3, 6 + n): reference of the signals; bias (2, 3): for
+    the estimated biases; table, ring, layout: of the recording; motors (rotors,): of the autopilot;
+    counts: see ROW to FAULT; magnet (1,): whether it is on.
+    """
+
+    sensing: Sensing
+    estimation: Estimation
+    inputs: InputArrays
+    position: PositionArrays
+    attitude: AttitudeArrays
+    arm: ArmArrays
+    bridge: BridgeArrays
+    reference: ReferenceArrays
+    autopilot: CycleArrays
+    state: np.ndarray
+    flown: np.ndarray
+    bias: np.ndarray
+    table: np.ndarray
+    ring: np.ndarray
+    motors: np.ndarray
+    layout: RowLayout
+    counts: np.ndarray
+    magnet: np.ndarray
+
+
+# entries of `counts`: row of the recording, ticks of its ring (first, next), slot of the pose that
+# arrives (-1: none), stamp [ns] of state and of the mission's begin (0: none), whether a setpoint
+# was sent, cycles of the autopilot, address of an error's text
+ROW, FIRST, NEXT, SLOT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(9)
+
+
+@cache
+def run(steps: Steps, arrays: Callable[[int], TickArrays]) -> Callable[[int, int, int], tuple]:
+    """Return the compiled loop; steps: of the laws; arrays: see `KeptTuple.read`."""
+    control_all = control(steps)
+
+    @borrowing
+    def steady_run(address: int, count: int, begin: int) -> tuple[int, int]:
+        """Begin up to `count` ticks and end them; begin: LISTEN, or RECORD to end one first.
+
+        Returns the number of ticks that ended, and where the loop ended.
+        """
+        a = arrays(address)
+        done = 0
+        while True:
+            if begin == LISTEN:
+                if count == 0:
+                    return done, END
+                count -= 1
+                end = begin_tick(a)
+                if end != LAWS:
+                    return done, end
+                control_all(
+                    *(a.position, a.attitude, a.arm, a.reference.memory[0].period),
+                    *(a.counts[STAMP], a.state, a.flown, a.inputs),
+                )
+                end = decide(a)
+                if end != RECORD:
+                    return done, end
+            begin = LISTEN
+            end = end_tick(a)
+            if end != END:
+                return done, end
+            done += 1
+            if a.bridge.memory[0].reported:
+                return done, END
+
+    return steady_run
+
+
+@inlined
+def begin_tick(a: TickArrays) -> int:
+    """Do the stages from the sensors to the mission; return LAWS, or where they end."""
+    s, c, i = a.sensing, a.counts, a.inputs
+    rotors = len(a.motors)
+    ring = a.ring[c[NEXT] % len(a.ring)]
+    sense(s, ring[MOTORS + rotors :])
+    m = s.memory[0]
+    slot = c[SLOT] = m.pose
+    joints = s.observed.alpha.shape[0]
+    at = m.tick - m.joints_late
+    row = s.samples[at % RING]
+    joint_stamp = stamp_of(at * m.period)
+    angles, speeds = row[6 : 6 + joints], row[6 + joints : 6 + 2 * joints]
+    pose = s.poses[max(slot, 0), VEHICLE_POSE]
+    position, quaternion, pose_stamp = pose[1:4], pose[4:8], -1
+    if slot >= 0:
+        pose_stamp = stamp_of(pose[0])
+        if not take_pose(a.bridge, pose_stamp / SECOND, position, quaternion):
+            return LISTEN
+        i.kept[MOCAP], i.at[MOCAP] = True, pose_stamp
+        put(pose[1:], i.mocap)
+    i.kept[JOINTS], i.at[JOINTS] = True, joint_stamp
+    put(row[6 + 2 * joints :], i.effort)
+    if slot >= 0 and m.tracks:
+        payload = s.poses[slot, PAYLOAD_POSE]
+        i.kept[PAYLOAD], i.at[PAYLOAD] = True, stamp_of(payload[0])
+        put(payload[1:4], i.payload)
+    at = m.tick - m.imu_late
+    sample, stamp = s.samples[at % RING], stamp_of(at * m.period)
+    found = estimate(
+        *(a.estimation, stamp, sample[0:3], sample[3:6], pose_stamp, position, quaternion),
+        *(joint_stamp, angles, speeds, a.state),
+    )
+    if found != STEADY:
+        return ESTIMATE if found == NOTHING else DIVERGE
+    c[STAMP] = stamp
+    if a.estimation.memory[0].bias_due:
+        write_biases(a.estimation.pose, a.bias)
+        i.kept[BIAS], i.at[BIAS] = True, stamp / SECOND
+        put(a.bias[1], i.bias)
+    read_inputs(i, stamp)
+    c[BEGUN] = stamp
+    a.reference.memory[0].begun = a.reference.memory[0].time
+    for row in range(len(a.flown)):
+        put(a.reference.reference[row], a.flown[row])
+    return LAWS
+
+
+@inlined
+def decide(a: TickArrays) -> int:
+    """Do the stages bridge and next reference; return RECORD, or where they end."""
+    c, m = a.counts, a.sensing.memory[0]
+    stamp, tau_p, tau_q = c[STAMP], a.position.law.tau, a.attitude.law.tau
+    time = m.tick * m.period
+    if not send(
+        *(a.bridge, stamp, time, a.state, tau_p, tau_q, a.position.attitude, a.inputs),
+    ):
+        return BRIDGE
+    c[SENT] = 1
+    if not advance(a.reference, a.inputs, stamp, a.state):
+        return REFERENCE
+    return WATCH if watch_due(a.reference) else RECORD
+
+
+@inlined
+def end_tick(a: TickArrays) -> int:
+    """Record the tick, run the autopilot and the physics; return END, or where they end."""
+    c, s, m, bridge = a.counts, a.sensing, a.sensing.memory[0], a.bridge.memory[0]
+    time = m.tick * m.period
+    magnet = 1.0 if a.magnet[0] else 0.0
+    stamp = c[STAMP] / SECOND - m.period / 2.0
+    c[FIRST] = record(
+        *(a.table, c[ROW], a.ring, c[FIRST], c[NEXT], time, a.motors, magnet, stamp),
+        *(a.reference.memory[0].begun, a.state, a.flown, a.position.attitude),
+        *(a.position.law.tau, a.attitude.law.tau, a.arm.law.tau, a.bridge.rates, bridge.sent),
+        *(bridge.used, a.layout),
+    )
+    c[NEXT] += 1
+    c[ROW] += 1
+    sample = s.samples[m.tick % RING]
+    if not cycle(a.autopilot, a.bridge, time, sample[0:3], sample[3:6]):
+        return AUTOPILOT
+    c[CYCLES] += 1
+    c[FAULT] = step(s, a.motors, a.arm.command, a.magnet[0])
+    return ERROR if c[FAULT] else END

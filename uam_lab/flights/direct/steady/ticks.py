@@ -1,0 +1,269 @@
+"""Flies the steady ticks of a flight: when, and what is copied between objects and loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from operator import is_
+from typing import Protocol
+from weakref import proxy
+
+import numpy as np
+
+from uam_control.maths.compiled import active, counts_references, prepared
+from uam_control.maths.kept_tuple import KeptTuple
+from uam_control.stages.bridge_stage import BridgeStage
+from uam_control.stages.control_tick import STAGES, ControlTick, take_report
+from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.mission_stage import MissionStage
+from uam_control.stamps import SECOND, nanoseconds
+from uam_lab.flights.direct.record import TickRecorder
+from uam_lab.flights.direct.steady.bridge import BridgePart
+from uam_lab.flights.direct.steady.cycle import CyclePart
+from uam_lab.flights.direct.steady.estimation import EstimationPart
+from uam_lab.flights.direct.steady.inputs import InputsPart
+from uam_lab.flights.direct.steady.laws import (
+    ArmPart,
+    AttitudePart,
+    LawPart,
+    attitude_arrays,
+    position_arrays,
+)
+from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
+from uam_lab.flights.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
+from uam_lab.flights.direct.steady.reference import ReferencePart
+from uam_lab.flights.direct.steady.sensing import PAYLOAD_POSE, VEHICLE_POSE, SensingPart
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.joined import JoinedAutopilot
+from uam_sim_bridge.plant import PhysicsError, Plant
+from uam_sim_bridge.plant.engine_step import error_text
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+
+COMPILES = "compiling the direct engine for this law and vehicle (once)"
+LEAST = 2  # ticks for which the copies are worth their time
+
+
+class Flight(Protocol):
+    """What the steady ticks need of a `DirectFlight`; see there."""
+
+    plant: Plant
+    control: ControlTick
+    autopilot: JoinedAutopilot
+    autopilot_imu: bool
+    recorder: TickRecorder
+    say: Callable[[str], object]
+
+    def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
+        """Finish a tick that steady ticks have begun."""
+
+
+class SteadyTicks:
+    """Flies the steady ticks of a flight.
+
+    `able`: whether the flight may have any; `ticks`: how many it has had.
+    """
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight, self.ticks = proxy(flight), 0  # the flight owns this object
+        stages, plant, port = flight.control, flight.plant, flight.autopilot
+        kinds = (  # none of a class of its own
+            *((plant, MujocoPlant), (port, JoinedAutopilot), (stages.bridge, BridgeStage)),
+            *((stages.estimator, EstimatorStage), (stages.mission, MissionStage)),
+        )
+        usual = all(type(one) is kind for one, kind in kinds) and stages.stages == list(STAGES)
+        self.able = usual and type(port.autopilot) is Autopilot and not flight.autopilot_imu
+        if not self.able:
+            return
+        self._sensing, self._bridge = SensingPart(plant), BridgePart(stages.bridge)
+        self.able = self._sensing.able() and self._bridge.able()
+        if not self.able:
+            return
+        laws = (stages.position, stages.attitude, stages.arm)
+        self._steps = tuple(type(one.controller.law).step for one in laws)
+        if not all(map(counts_references, self._steps)):  # a law of somebody's own
+            self.able = False
+            return
+        self._estimation = EstimationPart(stages.estimator)
+        self._laws = (
+            LawPart(stages.position),
+            AttitudePart(stages.attitude, stages.measured_delay),
+            ArmPart(stages.arm),
+        )
+        self._controllers = [part.stage.controller for part in self._laws]
+        self._inputs = InputsPart(stages.mission.inputs, self._controllers, plant.joints)
+        self._reference = ReferencePart(stages.mission)
+        self._cycle = CyclePart(flight.autopilot)
+        self._counts, self._biases = np.zeros(9, dtype=np.int64), np.zeros((2, 3))
+        self._magnet = np.zeros(1, dtype=np.bool_)
+        self._made: tuple = ()
+        self._loop: Callable[[int, int], tuple[int, int]] | None = None
+
+    def fly(self, enough: int, most: int) -> int:
+        """Fly until `enough` ticks are flown, at most `most`, while they are steady.
+
+        The objects finish the tick that is not. Returns how many were flown, 0 for none. Raises
+        PhysicsError.
+        """
+        flown, begin = 0, LISTEN
+        while self.able and (flown < enough or begin == RECORD):
+            count = self._load(most - flown, begin)
+            if count < LEAST and begin == LISTEN:
+                break
+            left = enough - flown, most - flown
+            done, end = self._fly(count, begin, *left) if count >= 0 else (0, RECORD)
+            flown += done
+            self.ticks += done
+            if end == ERROR:
+                raise PhysicsError(f"MuJoCo: {error_text(self._counts.item(FAULT))}")
+            begin = RECORD if end == WATCH else LISTEN
+            if end not in (WATCH, END):
+                self._flight.finish(end, self._sensing.imu(self._flight.plant.tick))
+                return flown + 1
+        return flown
+
+    def _fly(self, count: int, begin: int, enough: int, most: int) -> tuple[int, int]:
+        """Fly after `_load`; return how many ticks ended, and where: see `places`."""
+        loop, reference, flown = self._present(), self._reference, 0
+        state = self._flight.control.signals.state
+        while True:
+            done, end = loop(count - reference.advanced, begin)
+            flown += done
+            if end == WATCH:
+                self._inputs.store_readings()
+                if not reference.watch(state):
+                    break
+                begin = RECORD
+            elif end == END and flown < enough:
+                count, begin = self._renew(most - flown), LISTEN
+                if count < LEAST:
+                    break
+            else:
+                break
+        self._store(end)
+        return flown, end
+
+    def _renew(self, most: int) -> int:
+        """Take a report and new noise between two ticks; return as `_load` does."""
+        report, stamp = self._bridge.report(), self._counts.item(STAMP)
+        if report is not None:
+            self._inputs.report(stamp, (report.round_trip, report.loop_delay))
+            if not self._laws[1].report(stamp, report.loop_delay):
+                return -1
+        most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
+        most = min(most, self._sensing.renew(), self._ticks_to_report(stamp))
+        return self._reference.renew(self._flight.control.signals.state, most)
+
+    def _ticks_to_report(self, stamp: int) -> int:
+        """Return how many ticks after `stamp` [ns] the next report is due."""
+        return max(1, -((stamp - self._bridge.due) // self._reference.period))
+
+    def _load(self, most: int, begin: int) -> int:
+        """Copy the state into the arrays; return how many ticks may begin, -1: not steady.
+
+        most: ticks that may end.
+        """
+        stages, recorder = self._flight.control, self._flight.recorder
+        signals, table, half = stages.signals, recorder.table, begin == RECORD
+        output, reference, bridge = stages.mission.output, self._reference, self._bridge
+        told = output.arm, output.magnet, False, output.regains
+        steady = (
+            signals.flying
+            and signals.phase == output.phase
+            and signals.magnet == output.magnet
+            and stages._told == told
+            and reference.steady(signals.stamp)
+            and bridge.load()
+            and self._cycle.load()
+            and self._estimation.load()
+            and self._inputs.load()
+            and all(part.load() for part in self._laws)
+        )
+        if not steady:
+            return -1
+        most = min(most, len(table.values) - table.count, self._sensing.load(half)) - half
+        most = min(most, self._ticks_to_report(signals.stamp))
+        ring = recorder._first, recorder._next
+        self._counts[:] = table.count, *ring, -1, signals.stamp, *(0,) * 4
+        return reference.load(signals.stamp, most) if most >= 0 else -1
+
+    def _present(self) -> Callable[[int, int], tuple[int, int]]:
+        """Return the loop with the arrays of all parts; made anew if objects have changed."""
+        flight, stages = self._flight, self._flight.control
+        made = (
+            *(flight.recorder.table.values, stages.estimator.estimator),
+            *(one.parameters for one in self._controllers),
+            *(stages.bridge.map._flat, flight.autopilot.autopilot._loop),
+            *(stages.mission.mission._guidance, stages.mission.mission._parameters),
+        )
+        same = len(made) == len(self._made) and all(map(is_, made, self._made))
+        if not same:
+            self._made = made
+            recorder = flight.recorder
+            arrays = TickArrays(
+                self._sensing.arrays,
+                self._estimation.arrays,
+                self._inputs.arrays,
+                position_arrays(self._laws[0]),
+                attitude_arrays(self._laws[1]),
+                self._laws[2].arm_arrays(),
+                self._bridge.arrays(),
+                self._reference.arrays(),
+                self._cycle.arrays(),
+                stages.signals.state,
+                stages.signals.reference,
+                self._biases,
+                recorder.table.values,
+                recorder._ring,
+                flight.autopilot.motors,
+                recorder._layout,
+                self._counts,
+                self._magnet,
+            )
+            self._kept = kept = KeptTuple(arrays)
+            loop = run(self._steps, kept.read)
+            if active() and not loop._cache.filled:
+                flight.say(COMPILES)
+            self._loop = partial(prepared(loop, 0, 0, 0), kept.address)
+        self._magnet[0] = stages.signals.magnet
+        return self._loop
+
+    def _store(self, end: int) -> None:
+        """Copy the state back after a loop that ended in `end`."""
+        flight, stages = self._flight, self._flight.control
+        signals, plant, recorder = stages.signals, flight.plant, flight.recorder
+        row, first, following, slot, stamp, begun, sent, cycles, _ = self._counts.tolist()
+        observed = end != END
+        self._sensing.store(observed)
+        self._estimation.store()
+        self._inputs.store()
+        for part in self._laws:
+            part.store()
+        self._reference.store(signals.state)
+        self._bridge.store(signals.state, stamp / SECOND, bool(sent))
+        newest = plant.tick if observed else plant.tick - 1
+        if cycles:
+            self._cycle.store(self._sensing.imu(plant.tick - 1))
+        table = recorder.table
+        table.phases[table.count : row] = table.phase_names[signals.phase]
+        table.count = row
+        recorder._first, recorder._next, recorder._lag = first, following, following - first
+        flight.autopilot.time = newest * plant.period
+        signals.stamp = stamp
+        if stages.bridge.report is not None:
+            take_report(stages, stages.bridge.report)
+        if begun:
+            signals.time = self._reference.begun(begun)
+        signals.thrust_factor, signals.setpoint = stages.bridge.factor, stages.bridge._kept
+        if observed:
+            signals.imu, signals.joints, signals.mocap, signals.payload = self._samples(slot)
+
+    def _samples(self, slot: int) -> tuple:
+        """Return the samples of IMU, joints, mocap and payload that have arrived at this tick."""
+        sensing, plant = self._sensing, self._flight.plant
+        found = [
+            sensing.imu(plant.tick - plant._imu_delay.ticks),
+            sensing.joints(plant.tick - plant._joints_delay.ticks),
+            None if slot < 0 else sensing.pose(slot, VEHICLE_POSE),
+            None if slot < 0 or not plant._tracks_payload else sensing.pose(slot, PAYLOAD_POSE),
+        ]
+        return tuple(one and (nanoseconds(one[0]), *one[1:]) for one in found)

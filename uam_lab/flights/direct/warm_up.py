@@ -1,0 +1,149 @@
+"""Compiles the control path before a flight, so that no node compiles during the flight.
+
+The compiled functions are kept on disk beside their sources (see uam_control.maths.compiled). When
+all of them are there and up to date, nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA
+from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.sight import RunningMean
+from uam_control.laws import catalogue
+from uam_control.laws.catalogue import LAWS
+from uam_control.maths.compiled import active
+from uam_control.mission import Feasibility, load_scenario
+from uam_control.mission.motion.trajectory import empty_motion
+from uam_control.mission.scenarios.scenario import standing
+from uam_control.profiles.profile import default_profile
+from uam_control.setpoints.vision_pose import VisionPose
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_sim_bridge.autopilot import companion
+from uam_sim_bridge.faults.schedule import read_schedule
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
+
+PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
+STEADY = "uam_lab.flights.direct.steady."  # modules that only a direct flight imports
+STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"  # options of this module as a program
+TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
+LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
+
+
+def compiled_functions() -> Iterator:
+    """Yield every function under `jit` in the imported modules; none without numba."""
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] in PACKAGES:
+            for value in vars(module).values():
+                if hasattr(value, "py_func") and value.py_func.__module__ == name:
+                    yield value
+
+
+def is_cold() -> bool:
+    """Return whether a function of the control path is not compiled from its present source."""
+    return not all(
+        function._cache.filled
+        for function in compiled_functions()
+        if not function.py_func.__module__.startswith(STEADY)  # see `prepare_direct`
+    )
+
+
+def prepare(say: Callable[[str], None] = lambda text: None) -> None:
+    """Compile the control path unless it is compiled; say: called before that takes its time."""
+    if is_cold():
+        say("compiling the control path (once)")
+        # the nodes of the vehicle here, beside them what stands in for it, on another core
+        command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up", STAND_IN]
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as beside:
+            try:
+                warm_up([catalogue.DEFAULT])
+            except BaseException:
+                beside.terminate()
+                raise
+        warm_up(law for law in LAWS if law != catalogue.DEFAULT)
+
+
+def prepare_direct(
+    say: Callable[[str], None] = lambda text: None, laws: Iterable[str] = (catalogue.DEFAULT,)
+) -> None:
+    """Do what `prepare` does, and compile the steady ticks of the direct engine with `laws`."""
+    from uam_lab.flights.direct.steady.laws import control
+
+    prepare(say)
+    for law in laws:
+        if active() and not (
+            _filled(control((LAWS[law].step,) * 3)) and all(map(_filled, _steady()))
+        ):
+            say(f"compiling the direct engine with {law} (once)")
+            hover, vehicle = load_scenario("hover"), Vehicle.load()
+            flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
+            while flight.plant.tick < TICKS:
+                flight.advance(TICKS, TICKS)
+
+
+def _steady() -> Iterator:
+    """Yield the compiled functions of the steady ticks."""
+    import uam_lab.flights.direct.steady.ticks  # noqa: F401
+
+    yield from (one for one in compiled_functions() if one.py_func.__module__.startswith(STEADY))
+
+
+def _filled(function: Callable) -> bool:
+    """Return whether a function has machine code on disk; one that is inlined never has."""
+    return getattr(function._cache, "filled", True)
+
+
+def warm_up(laws: Iterable[str]) -> None:
+    """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
+    for law in laws:
+        flight = _flight(law)
+        for _ in range(TICKS):
+            flight.tick()
+    _others()
+
+
+def _flight(law: str) -> DirectFlight:
+    scenario = load_scenario("hover")
+    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
+    faults = read_schedule([LATE_POSES], scenario, seed=1)
+    return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
+
+
+def _stand_in() -> None:
+    """Run plant and autopilot without a controller, then what no flight calls."""
+    flight = _flight(catalogue.DEFAULT)
+    arm = np.zeros(len(flight.plant.vehicle.description.joints))
+    for _ in range(TICKS // 10):
+        motors = flight.autopilot.update(*flight.plant.sense().hil)
+        flight.plant.step(motors, arm, True)
+    _others()
+
+
+def _others() -> None:
+    curve = load_scenario("circle")
+    limits = default_profile(catalogue.DEFAULT).sets["mission"]
+    check = Feasibility(Vehicle.load().description, limits, 0.0)
+    for scenario in (load_scenario("hover"), curve):
+        check.excesses(scenario)
+    curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
+    mean = RunningMean()  # of the grasp, which a flight without a payload does not check
+    for stamp in (0.0, 0.004):
+        mean.add(stamp, np.zeros(3))
+    joints = len(curve.arm_start)
+    magnet_and_lever(np.zeros(ALPHA + joints), [0.0] * 3, [0.0] * joints, 0.0)
+    vision_message(VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0))
+    companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
+
+
+if __name__ == "__main__":
+    if STAND_IN in sys.argv:
+        _stand_in()
+    else:
+        prepare_direct(print, LAWS if ALL_LAWS in sys.argv else [catalogue.DEFAULT])

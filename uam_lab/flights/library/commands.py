@@ -1,0 +1,103 @@
+"""Commands and parameters for the nodes of one flight, from any thread."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
+
+from uam_control.profiles.profile import Profile
+from uam_lab.flights.library.errors import CommandRefused, FlightError
+from uam_lab.flights.operator import NoFlight, Operator
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.processes.node_environment import transport_environment
+from uam_lab.flights.ros.profile_switch import ProfileSwitch, SwitchRefused
+
+Changes = dict[str, dict[str, tuple[Any, Any]]]  # node → name → (old, new)
+Found = TypeVar("Found")
+
+
+class Commands:
+    """Clients in the ROS domain of a flight, made at their first use. Raises CommandRefused."""
+
+    def __init__(self, domain: int, namespace: str, arguments: Sequence[str]) -> None:
+        """domain, namespace: of the flight; arguments: of ROS, as remappings."""
+        self._place, self._arguments = (domain, namespace), tuple(arguments)
+        self._lock = threading.Lock()
+        self._guests: list[Guest] = []
+        self._operator: Operator | None = None
+        self._switch: ProfileSwitch | None = None
+
+    def guest(self, name: str) -> Guest:
+        """Return a new node in the flight's graph; the caller closes it."""
+        return Guest(name, transport_environment(), *self._place, self._arguments)
+
+    def _own(self, name: str) -> Any:
+        guest = self.guest(name)
+        self._guests.append(guest)
+        return guest.node
+
+    def call(self, act: Callable[[Operator], Found]) -> Found:
+        """Return act(operator); one call at a time."""
+        with self._lock, _refusals():
+            if self._operator is None:
+                self._operator = Operator(self._own("uam_operator"))
+            return act(self._operator)
+
+    def command(self, name: str) -> str:
+        """Send a command; return the answer."""
+        return _accepted(self.call(lambda operator: operator.command(name)))
+
+    def kill(self) -> str:
+        """Stop the motors at once; return the answer."""
+        return _accepted(self.call(Operator.kill))
+
+    def goto(self, x: float, y: float, z: float, yaw: float | None) -> str:
+        """Send a goal pose; return the answer."""
+        heading = math.nan if yaw is None else yaw
+        return _accepted(self.call(lambda operator: operator.goto(x, y, z, heading)))
+
+    def plan(self, message: Any) -> str:
+        """Send a goal or a trajectory; return the answer."""
+        return _accepted(self.call(lambda operator: operator.plan(message)))
+
+    def change(self, desired: Mapping[str, Mapping[str, Any]]) -> Changes:
+        """Set parameters, all or none."""
+        return self._change(lambda switch: switch.change(desired))
+
+    def switch(self, profile: Profile) -> Changes:
+        """Activate a profile, in all nodes or in none."""
+        return self._change(lambda switch: switch.switch(profile))
+
+    def _change(self, act: Callable[[ProfileSwitch], Changes]) -> Changes:
+        with self._lock, _refusals():
+            if self._switch is None:
+                self._switch = ProfileSwitch(self._own("uam_parameters"))
+            return act(self._switch)
+
+    def close(self) -> None:
+        """Close the clients."""
+        with self._lock:
+            for guest in self._guests:
+                guest.close()
+            self._guests.clear()
+            self._operator = self._switch = None
+
+
+@contextlib.contextmanager
+def _refusals() -> Iterator[None]:
+    try:
+        yield
+    except SwitchRefused as error:
+        raise CommandRefused("; ".join(str(error).splitlines())) from None
+    except NoFlight as error:
+        raise FlightError(str(error)) from None
+
+
+def _accepted(answer: tuple[bool, str]) -> str:
+    accepted, text = answer
+    if not accepted:
+        raise CommandRefused(text)
+    return text

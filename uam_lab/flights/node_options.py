@@ -1,0 +1,110 @@
+"""Parameters and remappings of single nodes of a flight, checked before anything starts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from uam_control.profiles.profile import (
+    BRIDGE,
+    BRIDGE_LINKS,
+    FLIGHT_OWN,
+    NODES,
+    Profile,
+    profile_of,
+)
+from uam_lab.records.results.metrics import plain
+
+# nodes whose parameters are in no profile
+FLIGHT_CONTROLLER = "flight_controller"
+OTHER_NODES = ("mujoco_sim", "scene", "recorder", "cockpit", FLIGHT_CONTROLLER)
+EVERY_NODE = ""
+
+
+class SettingsError(ValueError):
+    """An invalid option; the text is one line: what is wrong and what is allowed."""
+
+
+def parameters(
+    profile: Profile, given: Mapping[str, Mapping[str, Any]], engine: str, fused: bool = False
+) -> tuple[Profile, dict[str, dict[str, Any]]]:
+    """Return the profile with the parameters `given`, and those of nodes without a profile.
+
+    fused: the control nodes are one process, which alone has the node FLIGHT_CONTROLLER.
+
+    Raises SettingsError, ProfileError.
+    """
+    sections, others = dict(profile.sections), {}
+    for node, values in given.items():
+        _known_node(node, (*NODES, BRIDGE, *OTHER_NODES))
+        if not isinstance(values, Mapping):
+            raise SettingsError(f"parameters of {node}: name → value expected, not {values!r}")
+        if node == FLIGHT_CONTROLLER and not fused:
+            raise SettingsError(f"parameters of {node}: only the fused layout has this node")
+        own = BRIDGE_LINKS if node == BRIDGE else FLIGHT_OWN.get(node, ())
+        if fixed := [name for name in values if name in own]:
+            raise SettingsError(f"{node}: {fixed[0]} follows from the other options of the flight")
+        if node not in OTHER_NODES:
+            sections[node] = sections.get(node, {}) | plain(dict(values))
+        elif engine == "direct":
+            raise SettingsError(f"the direct engine has no {node}: its parameters need engine ros")
+        else:
+            others[node] = plain(dict(values))
+    if sections == profile.sections:
+        return profile, others
+    changed = profile_of(sections, Path("parameters"), profile.vehicle)
+    return replace(changed, name=profile.name, file=profile.file), others
+
+
+def remappings(
+    given: Mapping[str, str | Mapping[str, str]], engine: str
+) -> dict[str, dict[str, str]]:
+    """Return node, or EVERY_NODE → old name → new name.
+
+    Raises SettingsError, also for names with which the nodes would not find each other.
+    """
+    if given and engine == "direct":
+        raise SettingsError("the direct engine has no topics: remappings need engine ros")
+    found: dict[str, dict[str, str]] = {}
+    for key, value in given.items():
+        if isinstance(value, Mapping):
+            _known_node(key, (*NODES, BRIDGE, *OTHER_NODES))
+            found[key] = dict(value)
+        else:
+            found.setdefault(EVERY_NODE, {})[key] = value
+    for old, new in (pair for names in found.values() for pair in names.items()):
+        if not all(isinstance(name, str) and name and ":" not in name for name in (old, new)):
+            raise SettingsError(
+                f"remapping {old!r} → {new!r}: two names of topics or services expected"
+            )
+    for node, names in found.items():
+        _check_topics(node, names)
+    return found
+
+
+def _check_topics(node: str, names: Mapping[str, str]) -> None:
+    """Refuse remappings that would cut the control loop. Raises SettingsError."""
+    from uam_msgs_py.messages import topics  # needs ROS, as remappings do
+    from uam_msgs_py.node.wiring import WIRES
+
+    every = {topic.name.removeprefix("/") for topic in topics.ALL}
+    loop = {wire.topic.name for wire in WIRES} | {topics.DIAGNOSTICS.name.removeprefix("/")}
+    bare = {old.removeprefix("/"): new.removeprefix("/") for old, new in names.items()}
+    taken: dict[str, str] = {}
+    for old, new in bare.items():
+        if node != EVERY_NODE and old in loop:
+            raise SettingsError(
+                f"remapping {old} of {node} alone would cut the control loop: "
+                "give it for every node, as topic → new name"
+            )
+        other = new if new in every - bare.keys() and new != old else taken.get(new)
+        if other is not None and (old in every or other in every):
+            raise SettingsError(f"remapping {old} → {new}: that is the topic {other}")
+        taken[new] = old
+
+
+def _known_node(node: str, nodes: Collection[str]) -> None:
+    if node not in nodes:
+        raise SettingsError(f"unknown node '{node}'; there are: {', '.join(nodes)}")

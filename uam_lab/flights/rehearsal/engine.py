@@ -1,0 +1,236 @@
+"""The engine of a rehearsal: laboratory and autopilot first, then the vehicle's nodes.
+
+    ports → lab file → laboratory → autopilot → nodes → lists → start → flight → log → table
+
+It releases all processes, devices and ports, also after an error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from uam_control.mission.time_limit import time_limit
+from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
+from uam_lab.flights.observer import Observer
+from uam_lab.flights.processes.guest import Guest
+from uam_lab.flights.processes.interrupts import StopRequest
+from uam_lab.flights.processes.node_environment import environment
+from uam_lab.flights.processes.processes import NodeFailed, Processes
+from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
+from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.rehearsed_outcome import read_outcome
+from uam_lab.flights.rehearsal.starter import Starter
+from uam_lab.flights.ros import node_arguments, supervise
+from uam_lab.flights.ros.status_listener import StatusListener
+from uam_lab.flights.vehicle import vehicle_nodes
+from uam_lab.flights.vehicle.lab import Lab
+from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
+from uam_lab.flights.vehicle.vehicle_engine import start_nodes
+from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.result_folder import ResultFolder, write_json
+from uam_msgs_py.node import wiring
+from uam_sim_bridge.nodes.laboratory import READY
+from uam_sim_bridge.ports import Ports, Reservation
+
+DEVICES, LOGS = "devices", "logs"  # in the result folder
+POLL = 0.05  # [s]
+SAY_PERIOD = 5.0  # [s] between two lines about the lists
+DEVICES_WAIT = 60.0  # [s] until the laboratory has its devices
+# items about the companion of the vehicle and the pilot's radio, which a rehearsal has not
+ABSENT = {"clock_synchronised": False, "performance_governor": False, "radio": False}
+OWN = (LABORATORY, AUTOPILOT)  # their end is no refused start
+
+
+class RehearsalEngine:
+    """`fly` is an engine of `library.Flight`."""
+
+    def __init__(self, lab: Lab, options: RehearsalOptions) -> None:
+        self._lab, self._options = lab, options
+
+    def fly(
+        self, settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+    ) -> Outcome:
+        """Rehearse, and record to `folder`; a failure or a requested stop keeps the recording.
+
+        settings: see `settings_of`. Raises PortError if no instance is free, LabError,
+        AddressError.
+        """
+        logs, devices = folder.path / LOGS, (folder.path / DEVICES).absolute()
+        for each in (logs, devices):
+            each.mkdir(exist_ok=True)
+        with Reservation(None, own_autopilot=False) as reservation:
+            ports = reservation.ports
+            document = emulated_lab.emulated(self._lab, devices, device_figures.free_udp_port())
+            lab = emulated_lab.write(document, self._lab.file, folder.path)
+            own = settings_of(lab, settings.command)
+            settings = replace(settings, link=own.link, autopilot=own.autopilot)
+            modules = vehicle_nodes.processes(lab)
+            supervise.prepare([*modules.values(), LABORATORY_MODULE], observer)
+            sections = vehicle_nodes.parameters(lab, settings, folder)
+            required = laboratory_process.required_parameters(self._options.px4, logs)
+            sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
+            _prepare_checklist(sections, self._options.checklist)
+            sections[LABORATORY] = laboratory_process.parameters(
+                lab, self._options, devices, logs, ports, _flight_limit(settings)
+            )
+            node_arguments.write(sections, settings, folder)
+            rehearsal = _Rehearsal(lab, settings, self._options, folder, ports, observer, stop)
+            failure = rehearsal.run(devices)
+        refused = rehearsal.refused
+        if failure is not None and not rehearsal.started and failure.name not in OWN:
+            refused = refused or str(failure)
+        outcome = read_outcome(settings, folder, failure, refused, stop.raised)
+        write_json(folder.path / device_figures.NAME, device_figures.read(folder.log, logs))
+        return outcome
+
+
+def _flight_limit(settings: FlightSettings) -> float:
+    """Return the time [s] after arming that ends a flight with faults, which may never land.
+
+    0, never, without faults: a person may fly by goals.
+    """
+    if not settings.faults:
+        return 0.0
+    return time_limit(settings.scenario, None)
+
+
+def _prepare_checklist(sections: dict[str, dict[str, Any]], required: bool) -> None:
+    """Leave out what this computer and the stand-in cannot have; not required: all of the list."""
+    if not required:
+        sections[wiring.MISSION].pop("require_checklist", None)
+        sections.pop(CHECKLIST, None)
+    elif CHECKLIST in sections:
+        sections[CHECKLIST] = ABSENT | sections[CHECKLIST]
+
+
+class _Rehearsal:
+    """The processes of one rehearsal; `refused`: why the mission was not started, "" if it was.
+
+    `started`: whether the mission has accepted the start.
+    """
+
+    def __init__(
+        self,
+        lab: Lab,
+        settings: FlightSettings,
+        options: RehearsalOptions,
+        folder: ResultFolder,
+        ports: Ports,
+        observer: Observer,
+        stop: StopRequest,
+    ) -> None:
+        self._lab, self._settings, self._options = lab, settings, options
+        self._folder, self._ports, self._observer, self._stop = folder, ports, observer, stop
+        self.refused, self.started = "", False
+        self._lists = options.checklist and CHECKLIST in vehicle_nodes.modules(lab)
+
+    def run(self, devices: Path) -> NodeFailed | None:
+        """Run all processes until the laboratory ends or the start is refused."""
+        publishers = vehicle_nodes.publishers(self._lab)
+
+        def start(children: Processes) -> None:
+            if self._start_laboratory(children, devices, publishers):
+                left_out = () if self._lists else (CHECKLIST,)
+                needed = self._lab, self._settings, self._folder, publishers
+                # a rehearsal is judged by its log
+                start_nodes(children, *needed, without=left_out, optional=(wiring.COCKPIT,))
+
+        failure, _ = supervise.run(
+            self._settings,
+            self._folder,
+            self._ports,
+            self._observer,
+            self._stop,
+            publishers,
+            start,
+            lambda children: self._announcement(children, devices),
+            lambda children, listener: RehearsalCourse(self, children, listener),
+        )
+        return failure
+
+    def _announcement(self, children: Processes, devices: Path) -> Iterator[str]:
+        yield (
+            f"{len(children.names)} processes in ROS domain {self._ports.domain}; "
+            f"devices in {devices}"
+        )
+
+    def _start_laboratory(self, children: Processes, devices: Path, publishers: str) -> bool:
+        """Start laboratory and autopilot; return whether the devices are there.
+
+        Raises NodeFailed.
+        """
+        arguments = supervise.ros_arguments(self._settings, self._folder, publishers)
+        children.start(LABORATORY, LABORATORY_MODULE, arguments, may_end=True)
+        patience = time.monotonic() + DEVICES_WAIT
+        while not (devices / READY).exists():
+            children.check()
+            if not children.running(LABORATORY) or time.monotonic() > patience:
+                raise NodeFailed(LABORATORY, 0, self._folder.path / LOGS / f"{LABORATORY}.log")
+            if self._stop.raised:
+                return False
+            time.sleep(POLL)
+        module, own = laboratory_process.autopilot(
+            self._lab, self._options, devices, self._folder.path, self._ports
+        )
+        children.start(AUTOPILOT, module, own, may_end=True)
+        return True
+
+    def vehicle_course(self, listener: StatusListener) -> VehicleCourse:
+        """Return the course of the vehicle's nodes."""
+        return VehicleCourse(self._lab, listener, self._guest, self._observer, self._stop)
+
+    def starter(self) -> Starter:
+        """Return the person who starts the mission."""
+        return Starter(self._guest, self._lists)
+
+    def say(self, text: str) -> None:
+        """Show one line."""
+        self._observer.message(text)
+
+    @property
+    def _guest(self) -> Callable[[str], Guest]:
+        surroundings = environment(self._ports.domain, self._folder.path / LOGS)
+        return lambda name: Guest(name, surroundings, self._ports.domain)
+
+
+class RehearsalCourse:
+    """A `Course`: that of the vehicle, with a laboratory that ends it and a person who starts it.
+
+    A context manager.
+    """
+
+    def __init__(
+        self, rehearsal: _Rehearsal, children: Processes, listener: StatusListener
+    ) -> None:
+        self._rehearsal, self._children = rehearsal, children
+        self._vehicle, self._starter = rehearsal.vehicle_course(listener), rehearsal.starter()
+        self._open = ExitStack()
+        self._said, self._say_at = "", 0.0  # [s] time.monotonic()
+
+    def __enter__(self) -> RehearsalCourse:
+        self._open.enter_context(self._vehicle)
+        self._open.enter_context(self._starter)
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._open.close()
+
+    def goes_on(self) -> bool:
+        """Return whether the laboratory and the vehicle's flight go on."""
+        starter, rehearsal = self._starter, self._rehearsal
+        vehicle = self._vehicle.goes_on()
+        rehearsal.started, rehearsal.refused = starter.started, starter.refused
+        now = time.monotonic()
+        if starter.waits_for != self._said and not starter.started and now >= self._say_at:
+            self._said, self._say_at = starter.waits_for, now + SAY_PERIOD
+            rehearsal.say(f"before the start: {self._said}")
+        # the starter decides in a thread of its own: what ends the rehearsal is what was stored
+        return vehicle and not rehearsal.refused and self._children.running(LABORATORY)

@@ -1,0 +1,95 @@
+"""Starts the mission of a rehearsal as a person does: when the lists have passed, `uam start`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from uam_lab.flights.operator import NoFlight, Operator
+from uam_lab.flights.processes.guest import Guest
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import OK
+from uam_msgs_py.node import polling
+from uam_msgs_py.node.door import Door
+
+LOOK = 0.2  # [s] between two looks
+AGAIN = 1.0  # [s] between two requests to start
+PATIENCE = 60.0  # [s] without progress until the start counts as refused
+
+
+class Starter(threading.Thread):
+    """Context manager. `started`: the mission has accepted; `refused`: why not, "" while it tries.
+
+    `waits_for`: what it waits for now, one line.
+    """
+
+    def __init__(
+        self, guest: Callable[[str], Guest], checklist: bool, patience: float = PATIENCE
+    ) -> None:
+        """guest: returns a node in the flight's ROS domain, by its name; checklist: wait for the
+        lists; patience [s]: without progress."""
+        super().__init__(name="starter", daemon=True)
+        self._guest, self._required = guest, checklist
+        self._patience = patience
+        self._ended = threading.Event()
+        self.started, self.refused, self.waits_for = False, "", "the nodes"
+
+    def __enter__(self) -> Starter:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self.join()
+
+    def run(self) -> None:
+        """Watch the lists, request the start."""
+        with self._guest("uam_rehearse") as guest:
+            lists = polling.listen(guest.node, topics.CHECKLIST)
+            operator, door = Operator(guest.node), Door(guest.node, tells=True)
+            passed, most = not self._required, -1
+            progress, asked = time.monotonic(), 0.0
+            while not self._ended.wait(LOOK) and not self.started:
+                now = time.monotonic()
+                for message in door.messages(lists):
+                    passed = passed or list_passed(message)
+                    self.waits_for = list_text(message)
+                    if (count := passed_items(message)) > most:  # not those that come and go
+                        most, progress = count, now
+                if now - progress > self._patience:
+                    self.refused = self.waits_for
+                    return
+                if passed and now - asked >= AGAIN:
+                    asked = now
+                    try:
+                        self.started, self.waits_for = operator.command("start")
+                    except NoFlight as error:
+                        self.waits_for = str(error)
+
+
+def list_passed(message: DiagnosticArray) -> bool:
+    """Return whether all items have passed."""
+    return _value(message, "passed") == "True"
+
+
+def list_text(message: DiagnosticArray) -> str:
+    """Return what is open or has failed, in one line."""
+    failing = _value(message, "failing")
+    text = message.status[0].message if message.status else ""
+    return f"{text}: {failing}" if failing and failing not in text else text
+
+
+def passed_items(message: DiagnosticArray) -> int:
+    """Return the number of items that have passed."""
+    return sum(one.level == OK for one in message.status[1:])
+
+
+def _value(message: DiagnosticArray, key: str) -> str:
+    for status in message.status[:1]:
+        for pair in status.values:
+            if pair.key == key:
+                return pair.value
+    return ""

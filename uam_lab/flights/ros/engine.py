@@ -1,0 +1,207 @@
+"""The ROS engine: starts each node in a separate process and supervises the processes.
+
+    ports → parameter file → processes → readiness → flight → stop in order → log → table
+
+It releases all processes, ports and locks, also after an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from uam_control.profiles.profile import CONTROLLERS
+from uam_lab.cockpit import page_address
+from uam_lab.flights.flight_settings import AUTOPILOT, ONLOOKERS, FlightSettings
+from uam_lab.flights.observer import FlightStatus, Observer
+from uam_lab.flights.processes.interrupts import StopRequest
+from uam_lab.flights.processes.processes import NodeFailed, Processes
+from uam_lab.flights.ros import node_arguments, supervise
+from uam_lab.flights.ros.logged_outcome import read_outcome
+from uam_lab.flights.ros.placement import placing
+from uam_lab.flights.ros.process_fault_injection import ProcessFaults
+from uam_lab.flights.ros.status_listener import StatusListener
+from uam_lab.flights.ros.waits import Waits
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.result_folder import ResultFolder
+from uam_msgs_py.node import wiring
+from uam_sim_bridge.faults import PROCESS
+from uam_sim_bridge.faults.timeline import FaultState
+from uam_sim_bridge.nodes.fault_topic import FaultTopic
+from uam_sim_bridge.nodes.plant_options import NOT_READY
+from uam_sim_bridge.ports import Ports, Reservation
+
+LOCKSTEP = "lockstep"
+
+
+def fly(
+    settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+) -> Outcome:
+    """Fly, and record to `folder`; a failure or a requested stop keeps the recording so far.
+
+    Raises PortError if no instance is free.
+    """
+    (folder.path / "logs").mkdir(exist_ok=True)
+    own_autopilot = not node_arguments.users_autopilot(settings)
+    with Reservation(
+        settings.instance,
+        own_autopilot=own_autopilot,
+        domain=settings.domain,
+        namespace=settings.namespace,
+    ) as reservation:
+        supervise.prepare(node_arguments.modules(settings).values(), observer)
+        ports = reservation.ports
+        sections = node_arguments.parameters(settings, folder, ports)
+        node_arguments.write(sections, settings, folder)
+        if wiring.COCKPIT in sections:
+            port = sections[wiring.COCKPIT]["port"]
+            observer.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
+        last: list[FlightStatus] = []
+        failure = _supervise(settings, folder, ports, observer, stop, last)
+        if failure is not None and failure.status == NOT_READY and not settings.foreign:
+            # on an overloaded machine the middleware may fail to connect all nodes
+            observer.message(f"{failure}; starting again")
+            _put_aside(folder)
+            failure = _supervise(settings, folder, ports, observer, stop, last)
+    outcome = read_outcome(settings, folder, failure, stop.raised)
+    if outcome.failure and failure is None and last and last[-1].time < 0.0:
+        outcome.failure = f"no take-off ({outcome.failure}); autopilot {last[-1].autopilot}"
+    return outcome
+
+
+def _put_aside(folder: ResultFolder) -> None:
+    """Move the logs of a failed start to logs/first_start/: the next one begins its own."""
+    logs = folder.path / "logs"
+    aside = logs / "first_start"
+    aside.mkdir()
+    recorded = (folder.log, folder.path / "metadata.yaml")
+    for file in (*logs.glob("*.log"), *filter(Path.exists, recorded)):
+        file.rename(aside / file.name)
+
+
+def _supervise(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    ports: Ports,
+    observer: Observer,
+    stop: StopRequest,
+    last: list[FlightStatus],
+) -> NodeFailed | None:
+    """Run the processes until the plant ends; return the failure.
+
+    last: receives the newest status of a flight without a failure.
+    """
+    failure, listener = supervise.run(
+        settings,
+        folder,
+        ports,
+        observer,
+        stop,
+        node_arguments.publishers(settings),
+        lambda children: _start(children, settings, folder, ports),
+        lambda children: _announcement(children, settings, ports),
+        lambda children, listener: SimulatedCourse(settings, children, listener, observer, stop),
+    )
+    if failure is None and listener is not None:
+        last[:] = listener.newest
+    return failure
+
+
+def _start(
+    children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> None:
+    publishers = node_arguments.publishers(settings)
+    arguments = supervise.ros_arguments(settings, folder, publishers)
+    for name, module in node_arguments.modules(settings).items():
+        children.start(
+            name,
+            module,
+            arguments + node_arguments.process_remappings(settings, name),
+            may_end=name == wiring.PLANT,
+            optional=name in ONLOOKERS,
+            again=supervise.RESTARTS if name in CONTROLLERS else 0,
+            nodes=node_arguments.nodes_in(name, settings),
+            place=placing(settings, ports.instance, name),
+        )
+    module, own = node_arguments.autopilot(settings, folder, ports)
+    if module:
+        place = placing(settings, ports.instance, AUTOPILOT)
+        children.start(AUTOPILOT, module, own, may_end=True, place=place)
+
+
+def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -> Iterator[str]:
+    yield (
+        f"{len(children.names)} processes in ROS domain {ports.domain}, "
+        f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
+    )
+    if node_arguments.users_autopilot(settings):
+        yield (
+            "waiting for your autopilot; restart a PX4 that has served a flight: it does not "
+            "connect again (px4_sitl restarts it by itself)"
+        )
+    for name in settings.foreign:
+        own = settings.own_names.get(name, name)
+        yield f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}"
+    if not settings.auto_start and not settings.dry_run:
+        real = settings.link is not None and settings.link.real
+        why = ": a real autopilot arms by itself only with --arm" if real else ""
+        yield f"waiting for uam start{why}"
+
+
+class SimulatedCourse:
+    """A flight in simulation: it goes on until the plant ends; faults of processes are injected.
+
+    In lockstep a process that stays stopped ends it, see `Waits`.
+    """
+
+    def __init__(
+        self,
+        settings: FlightSettings,
+        children: Processes,
+        listener: StatusListener,
+        observer: Observer,
+        stop: StopRequest,
+    ) -> None:
+        self._children, self._listener, self._stop = children, listener, stop
+        self._faults = _process_faults(settings, children, listener, observer)
+        self._waits = Waits(children, listener, observer) if settings.clock == LOCKSTEP else None
+
+    def goes_on(self) -> bool:
+        """Begin and end the due faults; return whether the plant runs and nobody stops it.
+
+        Raises NodeFailed.
+        """
+        injected, mission_time = self._stop.injected, self._listener.mission_time
+        while not injected.empty():
+            self._faults.add(injected.get(), mission_time or 0.0)
+        self._faults.update(mission_time, self._listener.phase)
+        if self._waits is not None:
+            self._waits.look()
+        return self._children.running(wiring.PLANT) and not self._stop.raised
+
+    def __enter__(self) -> SimulatedCourse:
+        self._faults.__enter__()
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._faults.__exit__(*exception)
+
+
+def _process_faults(
+    settings: FlightSettings, children: Processes, listener: StatusListener, observer: Observer
+) -> ProcessFaults:
+    """Return the process faults; their start and end are printed and recorded."""
+    schedule = settings.faults.only(PROCESS)
+    topics: list[FaultTopic] = []  # made with the first fault
+
+    def announce(one: FaultState) -> None:
+        stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
+        node = one.fault.values["node"]
+        process = children.process_of(node)
+        affected = node if process == node else f"{node}, hence of the process {process},"
+        observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
+        if not topics:
+            topics.append(FaultTopic(listener.node))
+        topics[0].publish(listener.stamp, [one])
+
+    return ProcessFaults(children, schedule, announce, lockstep=settings.clock == LOCKSTEP)

@@ -1,0 +1,20 @@
+"""Preparation of the process that forks a flight's nodes; importing this module runs it.
+
+It imports the nodes, loads the compiled functions and runs them once, and prepares the log, so that
+no node has to repeat this.
+"""
+
+import gc
+import importlib
+
+from uam_control.laws import catalogue
+from uam_lab.flights.direct.warm_up import warm_up
+from uam_lab.flights.ros import node_arguments
+from uam_msgs_py.node import log_callers
+
+for module in (*node_arguments.MODULES.values(), node_arguments.FUSED):
+    importlib.import_module(module)
+warm_up([catalogue.DEFAULT])
+log_callers.find_modules()
+gc.collect()
+gc.freeze()  # a garbage collection in a child must not copy the shared memory pages

@@ -1,0 +1,52 @@
+"""Result of a flight with the ROS engine, from its log and the statistics of the nodes."""
+
+from __future__ import annotations
+
+from uam_lab.flights.flight_settings import FlightSettings
+from uam_lab.flights.processes.processes import NodeFailed
+from uam_lab.records.recording.log_reader import read_flight
+from uam_lab.records.recording.mcap_reader import UnreadableLog
+from uam_lab.records.recording.node_statistics import RECORDER, losses, statistics
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.result_folder import ResultFolder
+
+
+def read_outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+) -> Outcome:
+    """Return the outcome of the flight in `folder`; failure: the failed node, if any."""
+    outcome = Outcome(series=None, interrupted=interrupted)
+    if failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    logs = folder.path / "logs"
+    numbers = statistics(logs / "mujoco_sim.json")
+    outcome.wall_s = numbers.get("wall_s", 0.0)
+    if settings.clock == "realtime":
+        outcome.latency_s = numbers.get("latency_s", [])
+        outcome.missed_ticks = numbers.get("missed_ticks")
+        late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+        if late:
+            outcome.notes.append(
+                f"{late} of {total} setpoints were more than one control period late"
+            )
+    outcome.notes.extend(losses(logs))
+    try:
+        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
+    except (UnreadableLog, OSError) as error:
+        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+        return outcome
+    flight.tell(outcome)
+    if flight.errors_of:
+        outcome.errors_of, outcome.wall_s = flight.errors_of, flight.wall_s
+        outcome.latency_s, outcome.missed_ticks = flight.latency_s, flight.missed
+    if not flight.done and not outcome.partial:
+        full = statistics(logs / RECORDER).get("ended")
+        ended = full or numbers.get("ended_by")
+        if settings.dry_run and ended and not full:
+            outcome.abort_reason = f"dry run, {ended}: nothing was armed"
+        else:
+            outcome.failure = ended or "the log has no end of the mission"
+    return outcome

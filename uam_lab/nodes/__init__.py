@@ -1,1 +1,0 @@
-"""Nodes without influence on the flight: recorder, scene and cockpit."""

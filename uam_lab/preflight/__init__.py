@@ -1,0 +1,1 @@
+"""Before a flight: installation and devices (doctor), the checklist of a vehicle."""

@@ -1,0 +1,177 @@
+"""The whole checklist: automatic items, then guided steps, then the permission to start.
+
+The guided steps begin when all automatic items pass. Items that need a standing vehicle are not
+judged while it is in the hands of a person; after the last step they must pass again. All items
+together give the permission; it is taken back when an automatic item fails, and comes back with it.
+Nothing changes while the vehicle is armed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from uam_lab.preflight.checklist.finding import Finding
+from uam_lab.preflight.checklist.step import Situation, Step, StepState
+
+AUTOMATIC, GUIDED = "automatic", "guided"
+NOT_YET = "not judged yet"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An event of the record: an item that has changed, at `time` [s] of the stamps."""
+
+    time: float
+    kind: str
+    name: str
+    state: str
+    value: str
+    limit: str
+    confirmed: bool = False
+    tries: int = 0
+
+
+class Checklist:
+    """`findings`: of the automatic items; `steps`: of the guided ones; `entries`: the record."""
+
+    def __init__(self, steps: Sequence[Step]) -> None:
+        self.steps = list(steps)
+        self.findings: tuple[Finding, ...] = ()
+        self.entries: list[Entry] = []
+        self._time = 0.0
+        self._armed = False
+        self._noted: dict[str, tuple[str, str]] = {}
+
+    @property
+    def step(self) -> Step | None:
+        """Return the step that is done now, None before the first and after the last one."""
+        return next(
+            (one for one in self.steps if one.state in (StepState.ACTIVE, StepState.FAILED)), None
+        )
+
+    @property
+    def in_hands(self) -> bool:
+        """Return whether a person handles the vehicle."""
+        return self.step is not None
+
+    @property
+    def failing(self) -> list[str]:
+        """Return one line per item that has not passed."""
+        found = [one.text for one in self.findings if not one.passed]
+        if not self.findings:
+            found.append(f"automatic items: {NOT_YET}")
+        for one in self.steps:
+            if one.state is not StepState.PASSED:
+                found.append(f"{one.name}: {one.value or one.state.value}")
+        return found
+
+    @property
+    def failing_names(self) -> list[str]:
+        """Return the names of the items that have not passed."""
+        found = [one.name for one in self.findings if not one.passed]
+        found += [] if self.findings else ["automatic items"]
+        return found + [one.name for one in self.steps if one.state is not StepState.PASSED]
+
+    @property
+    def passed(self) -> bool:
+        """Return whether every item has passed."""
+        return not self.failing_names
+
+    def update(self, now: Situation, findings: Iterable[Finding], armed: bool) -> None:
+        """Judge what is seen at `now`; findings: of the automatic items."""
+        self._time, self._armed = now.time, armed
+        if armed:
+            return
+        self._take(tuple(findings))
+        step = self.step
+        if step is None:
+            self._begin_next(now.time)
+        else:
+            step.update(now)
+            self._note_step(step)
+            if step.state is StepState.PASSED:
+                self._begin_next(now.time)
+
+    def _take(self, findings: tuple[Finding, ...]) -> None:
+        if self.in_hands:
+            before = {one.name: one for one in self.findings}
+            findings = tuple(before.get(one.name, one) if one.standing else one for one in findings)
+        self.findings = findings
+        for one in findings:
+            state = StepState.PASSED if one.passed else StepState.FAILED
+            self._note(AUTOMATIC, one, state)
+
+    def _begin_next(self, time: float) -> None:
+        """Begin the next open step; the first one only when all automatic items pass."""
+        upcoming = next((one for one in self.steps if one.state is StepState.OPEN), None)
+        if upcoming is None:
+            return
+        if upcoming is self.steps[0] and not all(one.passed for one in self.findings):
+            return
+        upcoming.begin(time)
+        self._note_step(upcoming)
+
+    def confirm(self) -> tuple[bool, str]:
+        """Confirm the present step; return whether it counts, and why or why not in one line."""
+        step = self.step
+        if self._armed:
+            return False, "refused: the vehicle is armed"
+        if step is None:
+            return False, f"refused: no step is waiting{self._why_not()}"
+        refusal = step.confirm(self._time)
+        if refusal:
+            return False, f"refused: {refusal}"
+        self._note_step(step)
+        self._begin_next(self._time)
+        return True, f"{step.name} confirmed"
+
+    def repeat(self) -> tuple[bool, str]:
+        """Begin the present step again, or the last one that has passed; returns as `confirm`."""
+        if self._armed:
+            return False, "refused: the vehicle is armed"
+        step = self.step
+        if step is None:
+            done = [one for one in self.steps if one.state is StepState.PASSED]
+            if not done:
+                return False, f"refused: no step has begun{self._why_not()}"
+            step = done[-1]
+        step.begin(self._time)
+        self._note_step(step)
+        return True, f"{step.name} begins again"
+
+    def _why_not(self) -> str:
+        names = ", ".join(self.failing_names)
+        return f"; open: {names}" if names else ", all items have passed"
+
+    def _note_step(self, step: Step) -> None:
+        self._note(GUIDED, step.finding, step.state, step.confirmed, step.tries)
+
+    def _note(
+        self,
+        kind: str,
+        finding: Finding,
+        state: StepState,
+        confirmed: bool = False,
+        tries: int = 0,
+    ) -> None:
+        """Add an entry if the state of an item has changed, or the result of a step.
+
+        The value of an automatic item changes all the time and is no event.
+        """
+        now = state.value, finding.value if kind == GUIDED else ""
+        if self._noted.get(finding.name) == now:
+            return
+        self._noted[finding.name] = now
+        self.entries.append(
+            Entry(
+                self._time,
+                kind,
+                finding.name,
+                state.value,
+                finding.value,
+                finding.limit,
+                confirmed,
+                tries,
+            )
+        )

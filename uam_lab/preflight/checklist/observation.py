@@ -1,0 +1,127 @@
+"""What the automatic items look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_lab.preflight.checklist.samples import Sample, angle_between, up
+from uam_lab.preflight.checklist.streams import StreamReport
+
+GOOD, WARNING, BAD = "good", "warning", "bad"  # levels of a node
+
+
+class NodeReport(NamedTuple):
+    """Newest diagnostics of a node: age [s], one of GOOD, WARNING, BAD, one line, values."""
+
+    age: float
+    level: str
+    summary: str
+    values: dict[str, str]
+
+
+class Box(NamedTuple):
+    """Corners (3,) [m, world]."""
+
+    low: Sequence[float]
+    high: Sequence[float]
+
+
+class PreArmLine(NamedTuple):
+    """A line of the mission's pre-arm report."""
+
+    name: str
+    value: str
+    limit: str
+    passed: bool
+
+
+@dataclass(frozen=True)
+class Host:
+    """The companion computer. None: not known.
+
+    disk [bytes]: free for the recording; synchronised: by the kernel; jump [s]: of the clock since
+    the start; governors: of the cores, () without frequency scaling; rtprio: highest real-time
+    priority that is allowed.
+    """
+
+    disk: float | None = None
+    synchronised: bool | None = None
+    jump: float = 0.0
+    governors: tuple[str, ...] = ()
+    rtprio: float = 0.0
+
+
+@dataclass(frozen=True)
+class Resting:
+    """Means of a short window of samples.
+
+    position (3,) [m, world]; joints (n,) [rad]; tilt [rad]: by motion capture; gravity_angle [rad]:
+    between the vertical of accelerometer and motion capture; force [m/s^2]: its size; rate [rad/s]:
+    largest mean body rate; spread [m]: largest of the position.
+    """
+
+    position: np.ndarray
+    joints: np.ndarray
+    tilt: float
+    gravity_angle: float
+    force: float
+    rate: float
+    spread: float
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample]) -> Resting:
+        """Return the means of at least one sample."""
+        vertical = np.mean([up(one.attitude) for one in samples], axis=0)
+        force = np.mean([one.force for one in samples], axis=0)
+        positions = np.array([one.position for one in samples])
+        rate = np.mean([one.rate for one in samples], axis=0)
+        return cls(
+            positions.mean(axis=0),
+            np.mean([one.joints for one in samples], axis=0),
+            angle_between(vertical, np.array([0.0, 0.0, 1.0])),
+            angle_between(vertical, force),
+            float(np.linalg.norm(force)),
+            float(np.max(np.abs(rate))),
+            float(np.max(np.ptp(positions, axis=0))),
+        )
+
+
+@dataclass
+class Observation:
+    """All that is known now; None, NaN or empty: not known.
+
+    expected: nodes that must run. pose_age [s]: mean age of a pose at its arrival. control_rate
+    [Hz]. stowed (n,) [rad]; joint_names (n,). temperatures [deg C] by joint; battery 0..1;
+    differences: of the autopilot's parameters from the required ones, one line each;
+    parameters_read: whether all of them have arrived; radio: whether the autopilot receives the
+    pilot's radio; fence: of the supervisor, room: of the lab file.
+    """
+
+    expected: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    stowed: np.ndarray
+    control_rate: float
+    gravity: float = 9.81
+    nodes: dict[str, NodeReport] = field(default_factory=dict)
+    mocap: StreamReport | None = None
+    imu: StreamReport | None = None
+    joint_states: StreamReport | None = None
+    pose_age: float | None = None
+    resting: Resting | None = None
+    temperatures: dict[str, float] = field(default_factory=dict)
+    battery: float = math.nan
+    connected: bool = False
+    armed: bool = False
+    killed: bool | None = None
+    radio: bool | None = None
+    differences: tuple[str, ...] = ()
+    parameters_read: bool | None = None
+    fence: Box | None = None
+    room: Box | None = None
+    preflight: tuple[PreArmLine, ...] = ()
+    host: Host = Host()

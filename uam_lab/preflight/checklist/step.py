@@ -1,0 +1,85 @@
+"""One step of the guided list: what a person does, and the judgement about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from uam_lab.preflight.checklist.finding import Finding
+from uam_lab.preflight.checklist.samples import Sample
+
+MOTION, CONFIRM = "motion", "confirm"  # what a step needs
+
+
+class StepState(Enum):
+    """State of a step; a FAILED one is tried again."""
+
+    OPEN = "open"
+    ACTIVE = "active"
+    PASSED = "passed"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the steps look at, at `time` [s].
+
+    sample: None until all sensors have sent; magnet: state that its driver reports, None without
+    one; killed: whether the kill switch is engaged, None if not known.
+    """
+
+    time: float
+    sample: Sample | None = None
+    magnet: bool | None = None
+    killed: bool | None = None
+
+
+class Step:
+    """Base of all steps.
+
+    name: machine-readable; needs: MOTION, CONFIRM or "" (nothing but time); seen: what is seen now.
+    commands: the mission computes body rates meanwhile; arm_released: the servos have no torque;
+    magnet: how it shall be switched, None for as it is. tries: how often the step was begun.
+    """
+
+    commands = False
+    arm_released = False
+    magnet: bool | None = None
+
+    def __init__(self, name: str, instruction: str, limit: str, needs: str) -> None:
+        self.name, self._instruction, self.limit, self.needs = name, instruction, limit, needs
+        self.state, self.value, self.seen = StepState.OPEN, "", ""
+        self.tries, self.confirmed = 0, False
+        self.ended: float | None = None  # [s]
+
+    @property
+    def instruction(self) -> str:
+        """Return what the person does now."""
+        return self._instruction
+
+    @property
+    def finding(self) -> Finding:
+        """Return the result."""
+        return Finding(self.name, self.value or "open", self.limit, self.state is StepState.PASSED)
+
+    def begin(self, time: float) -> None:
+        """Begin the step, or begin it again, at `time` [s]."""
+        self.state, self.tries, self.confirmed = StepState.ACTIVE, self.tries + 1, False
+        self.value, self.seen, self.ended = "", "", None
+
+    def update(self, now: Situation) -> None:
+        """Judge what is seen now; called only for an active or failed step."""
+
+    def confirm(self, time: float) -> str:
+        """Take the person's confirmation; return why it does not count, "" if it does."""
+        if self.needs != CONFIRM:
+            return f"{self.name} passes by what the sensors see, not by a confirmation"
+        self.confirmed = True
+        self._pass(time, "confirmed by the person")
+        return ""
+
+    def _pass(self, time: float, value: str) -> None:
+        self.state, self.value, self.ended = StepState.PASSED, value, time
+
+    def _fail(self, time: float, value: str) -> None:
+        self.state, self.value, self.ended = StepState.FAILED, value, time

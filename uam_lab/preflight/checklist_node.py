@@ -1,0 +1,303 @@
+"""Node: the checklist before a flight of a real vehicle, see docs/preflight.md.
+
+It reads the vehicle, asks a person for motions, and publishes the result on /uam/checklist. The
+mission starts with `require_checklist` only when all items have passed.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from uam_control.nodes.described import described_vehicle
+from uam_control.settings.parameter_set import ParameterError, ParameterSet, switch, text, vector
+from uam_control.stamps import SECOND
+from uam_control.vehicle import VehicleDescription
+from uam_lab.cockpit.services import Services
+from uam_lab.preflight.checklist.automatic import automatic
+from uam_lab.preflight.checklist.checklist import AUTOMATIC, GUIDED, Checklist
+from uam_lab.preflight.checklist.guided import guided
+from uam_lab.preflight.checklist.host import HostReader
+from uam_lab.preflight.checklist.limits import ChecklistParameters
+from uam_lab.preflight.checklist.observation import Box, Observation
+from uam_lab.preflight.checklist.record import record
+from uam_lab.preflight.checklist.step import Step, StepState
+from uam_lab.preflight.checklist_feed import Feed
+from uam_lab.records.results.atomic import write_text
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import (
+    FAILED,
+    OPEN,
+    PASSED,
+    ChecklistItem,
+    checklist_message,
+)
+from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
+from uam_msgs_py.node import wiring
+from uam_msgs_py.node.answering import ServingExecutor
+from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.namespace import label
+from uam_msgs_py.node.node_parameters import NodeParameters, plain, refuse_unknown
+from uam_msgs_py.node.rightful import rightful_nodes
+
+NAME = wiring.CHECKLIST
+POLL_PERIOD = 0.02  # [s]
+PUBLISH_PERIOD = 0.2  # [s] wall time
+FENCE_PERIOD = 1.0  # [s] wall time between two requests of the geofence
+FENCE = ("geofence_low", "geofence_high")  # parameters of the mission
+CORE = (
+    *(wiring.RECORDER, wiring.ESTIMATOR, wiring.MISSION),
+    *(wiring.POSITION, wiring.ATTITUDE, wiring.ARM, wiring.BRIDGE),
+)
+RESULTS = {
+    StepState.PASSED: PASSED,
+    StepState.FAILED: FAILED,
+    StepState.OPEN: OPEN,
+    StepState.ACTIVE: OPEN,
+}
+
+
+@dataclass(frozen=True)
+class ChecklistOptions(ParameterSet):
+    """What the checklist is about; it cannot change while the node runs."""
+
+    nodes: str = text(
+        "", "nodes that must run", f"names with commas between; empty: {', '.join(CORE)}"
+    )
+    record: str = text("", "JSON file of the results", "a file; empty: none")
+    recordings: str = text(".", "folder of the recording, for its disk space", "a folder")
+    room_low: tuple = vector(
+        (), "corner of the room that the geofence must keep, world: smallest x, y, z", "m",
+        -1e4, 1e4, 3, optional=True,
+    )  # fmt: skip
+    room_high: tuple = vector(
+        (), "the opposite corner: largest x, y, z", "m", -1e4, 1e4, 3, optional=True
+    )
+    magnet: bool = switch(True, "the vehicle has a magnet")
+
+    def check_together(self) -> None:
+        """Refuse a room with one corner only, or with a side of no length."""
+        if bool(self.room_low) != bool(self.room_high):
+            raise ParameterError("room_low, room_high: give both corners or none")
+        if any(a >= b for a, b in zip(self.room_low, self.room_high, strict=True)):
+            raise ParameterError("room_low must be below room_high on each axis")
+
+
+class ChecklistNode:
+    """Joins the feed, the checklist, and what other nodes do for its steps."""
+
+    def __init__(
+        self,
+        node: Node,
+        watcher: Node,
+        vehicle: VehicleDescription,
+        options: ChecklistOptions,
+        limits: NodeParameters[ChecklistParameters],
+    ) -> None:
+        """watcher: a node that is not spun, for the polled topics."""
+        self._node, self._limits = node, limits
+        self._checklist = Checklist(guided(vehicle.joint_names, limits.current, options.magnet))
+        limits.apply = self._set_limits
+        self._vehicle, self._options = vehicle, options
+        observation = Observation(
+            expected=tuple(one for one in options.nodes.split(",") if one) or CORE,
+            joint_names=vehicle.joint_names,
+            stowed=np.array(vehicle.stowed),
+            control_rate=1.0 / vehicle.control_period,
+            gravity=float(vehicle.numbers["gravity"]),
+            room=Box(options.room_low, options.room_high) if options.room_low else None,
+        )
+        host = HostReader(Path(options.recordings))
+        self._feed = Feed(
+            watcher, rightful_nodes(node), vehicle, observation, host, lambda: limits.current
+        )
+        self._services = Services(node)
+        self._publisher = node.create_publisher(
+            topics.CHECKLIST.type, topics.CHECKLIST.name, topics.CHECKLIST.qos
+        )
+        self._diagnostics = node.create_publisher(
+            topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
+        )
+        node.create_service(Trigger, "~/confirm", self._answer("confirm", self._checklist.confirm))
+        node.create_service(Trigger, "~/repeat", self._answer("repeat", self._checklist.repeat))
+        self._due = self._diagnostics_due = self._fence_due = 0.0
+        self._published: ChecklistState | None = None
+        self._begun: tuple[str, int] = ("", 0)  # name and try of the step that was acted for
+        self._released = False  # the arm
+        self._recorded = 0  # number of entries in the file
+
+    def _set_limits(self, limits: ChecklistParameters) -> None:
+        """Use new limits: the guided steps begin anew with them."""
+        self._checklist.steps[:] = guided(self._vehicle.joint_names, limits, self._options.magnet)
+
+    def _answer(
+        self, name: str, act: Callable[[], tuple[bool, str]]
+    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+        def answered(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = act()
+            self._node.get_logger().info(f"command {name}: {response.message}")
+            return response
+
+        return answered
+
+    def look(self) -> None:
+        """Take new messages, judge, publish."""
+        now, wall = self._feed.look(), time.monotonic()
+        seen = self._feed.observation
+        if not seen.armed and wall >= self._fence_due:
+            self._fence_due = wall + FENCE_PERIOD
+            self._ask_fence()
+        before = len(self._checklist.entries)
+        self._checklist.update(now, automatic(seen, self._limits.current), seen.armed)
+        for entry in self._checklist.entries[before:]:
+            if entry.kind == GUIDED:
+                self._node.get_logger().info(f"{entry.name} {entry.state}: {entry.value}")
+        self._act(self._checklist.step)
+        self._services.look()
+        self._record()  # before a reader hears of it
+        self._publish(wall)
+
+    def _act(self, step: Step | None) -> None:
+        """Switch the magnet and release the arm as the step needs it."""
+        released = step is not None and step.arm_released
+        if released != self._released:
+            self._released = released
+            if not released:  # the law has adapted to an arm that did not obey
+                self._call(Trigger, "arm_controller/reset_adaptation", Trigger.Request())
+            self._call(SetBool, "arm_driver/release", SetBool.Request(data=released))
+        begun = ("", 0) if step is None else (step.name, step.tries)
+        if begun != self._begun:
+            self._begun = begun
+            if step is not None and step.magnet is not None:
+                self._call(SetBool, "mission/magnet", SetBool.Request(data=step.magnet))
+
+    def _call(self, kind: type, service: str, request: SetBool.Request | Trigger.Request) -> None:
+        """Call a service of a step; a failure is logged. A vehicle may lack the node."""
+
+        def answered(response: SetBool.Response | Trigger.Response | None, why: str) -> None:
+            if response is None or not response.success:
+                self._node.get_logger().warning(f"{service}: {why or response.message}")
+
+        self._services.call(kind, service, request, answered)
+
+    def _ask_fence(self) -> None:
+        def answered(response: GetParameters.Response | None, why: str) -> None:
+            if response is not None and len(response.values) == len(FENCE):
+                self._feed.observation.fence = Box(*(plain(one) for one in response.values))
+
+        service = f"{wiring.MISSION}/get_parameters"
+        if self._services.ready(GetParameters, service):
+            request = GetParameters.Request(names=list(FENCE))
+            self._services.call(GetParameters, service, request, answered)
+
+    @property
+    def state(self) -> ChecklistState:
+        """Return the state for /uam/checklist."""
+        checklist = self._checklist
+        step = checklist.step
+        failing = "; ".join(checklist.failing_names)
+        if step is None:
+            return ChecklistState(checklist.passed, failing)
+        seen = step.seen if step.state is StepState.ACTIVE else f"{step.value}; now: {step.seen}"
+        return ChecklistState(
+            checklist.passed,
+            failing,
+            step.name,
+            step.needs,
+            step.instruction,
+            seen,
+            step.state is StepState.FAILED,
+            step.commands,
+        )
+
+    def _items(self) -> list[ChecklistItem]:
+        found = [
+            ChecklistItem(one.name, AUTOMATIC, PASSED if one.passed else FAILED, one.value,
+                          one.limit)
+            for one in self._checklist.findings
+        ]  # fmt: skip
+        for one in self._checklist.steps:
+            at = "" if one.ended is None else f"{one.ended:.3f}"
+            found.append(
+                ChecklistItem(
+                    one.name, GUIDED, RESULTS[one.state], one.value or one.seen, one.limit, at,
+                    one.confirmed,
+                )
+            )  # fmt: skip
+        return found
+
+    def _publish(self, wall: float) -> None:
+        """Publish on a change of the step or of the permission, and each PUBLISH_PERIOD."""
+        state = self.state
+        last = self._published
+        same = last is not None and (state.passed, state.step, state.needs, state.failed) == (
+            last.passed, last.step, last.needs, last.failed,
+        )  # fmt: skip
+        if same and wall < self._due:
+            return
+        self._due, self._published = wall + PUBLISH_PERIOD, state
+        stamp = round(self._feed.now * SECOND)
+        self._publisher.publish(checklist_message(stamp, state, self._items()))
+        if wall >= self._diagnostics_due:
+            self._diagnostics_due = wall + 1.0
+            door = self._feed.door
+            values = {"step": state.step, "failing": state.failing, **door.values()}
+            level, summary = OK if state.passed else WARN, state.summary
+            if new := door.news():
+                level, summary = ERROR, "; ".join(new)
+                self._node.get_logger().error(summary)
+            self._diagnostics.publish(diagnostic(stamp, label(self._node), level, summary, values))
+
+    def _record(self) -> None:
+        """Write the record when something has been added."""
+        file, count = self._options.record, len(self._checklist.entries)
+        if not file or count == self._recorded:
+            return
+        self._recorded = count
+        content = record(self._checklist, self._limits.current, time.time() - self._feed.now)
+        try:
+            write_text(Path(file), json.dumps(content, indent=1) + "\n")
+        except OSError as error:
+            self._node.get_logger().error(f"{file} cannot be written: {error.strerror}")
+
+
+def main() -> int:
+    """Run the checklist until SIGINT or SIGTERM; return the exit status."""
+    stop = StopSignal()
+    node = begin(NAME)
+    if node is None:
+        return REFUSED
+    try:
+        options = NodeParameters(node, ChecklistOptions, read_only=True).current
+        limits = NodeParameters(node, ChecklistParameters)
+        vehicle = described_vehicle(node)
+        watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
+        checklist = ChecklistNode(node, watcher, vehicle, options, limits)
+        refuse_unknown(node)
+    except ParameterError as error:
+        return refuse(NAME, error)
+    executor = ServingExecutor()
+    executor.add_node(node)
+    while not stop.raised:
+        end = time.monotonic() + POLL_PERIOD
+        checklist.look()
+        while (left := end - time.monotonic()) > 0.0 and not stop.raised:
+            executor.spin_once(timeout_sec=left)
+    watcher.destroy_node()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    stop.ignore()
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

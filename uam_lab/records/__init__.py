@@ -1,0 +1,1 @@
+"""What a flight leaves: log, table, facts, metrics."""

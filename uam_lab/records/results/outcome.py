@@ -1,0 +1,79 @@
+"""Result of a flight, the same for both engines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from uam_control.grasp import GraspDecision
+from uam_control.supervision import State, StateTransition
+from uam_lab.records.results.timeseries import Series
+
+
+def transition(time: float, before: str, after: str, cause: str) -> dict[str, Any]:
+    """Return one change of the supervisor's state for metrics.json; time: mission time [s]."""
+    return {"time_s": round(time, 6), "from": before, "to": after, "cause": cause}
+
+
+def transitions(changes: Sequence[StateTransition]) -> list[dict[str, Any]]:
+    """Return the supervisor's state changes in mission time.
+
+    Without a take-off the time counts from the last change.
+    """
+    takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
+    begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0
+    return [transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes]
+
+
+def grasp_decision(time: float, grasp: str, attempt: int, text: str) -> dict[str, Any]:
+    """Return one decision about the payload for metrics.json; time: mission time [s]."""
+    return {"time_s": round(time, 6), "grasp": grasp, "attempt": attempt, "text": text}
+
+
+def grasp_decisions(
+    decisions: Sequence[GraspDecision], changes: Sequence[StateTransition]
+) -> list[dict[str, Any]]:
+    """Return the decisions about the payload in mission time; changes: of the supervisor."""
+    begin = next((one.stamp for one in changes if one.target is State.TAKING_OFF), 0.0)
+    return [grasp_decision(d.stamp - begin, d.grasp.value, d.attempt, d.text) for d in decisions]
+
+
+@dataclass
+class Outcome:
+    """Result that an engine returns.
+
+    series: None without a recorded control tick. wall_s: wall time from first to last tick.
+    abort_reason: reason of the mission's abort. failure: technical reason of the flight's end, one
+    line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
+    parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
+    grasps: see `grasp_decision`; faults: see `faults.timeline.record`. errors_of: "" for errors
+    truth − reference, else what stands for the truth.
+    """
+
+    series: Series | None
+    wall_s: float = 0.0
+    abort_reason: str = ""
+    failure: str = ""
+    details: Sequence[str] = ()
+    interrupted: bool = False
+    latency_s: Sequence[float] | None = None
+    missed_ticks: int | None = None
+    notes: list[str] = field(default_factory=list)
+    parameter_changes: list[dict[str, Any]] = field(default_factory=list)
+    transitions: list[dict[str, Any]] = field(default_factory=list)
+    grasps: list[dict[str, Any]] = field(default_factory=list)
+    faults: list[dict[str, Any]] = field(default_factory=list)
+    errors_of: str = ""
+
+    @property
+    def partial(self) -> bool:
+        """Return whether the recording ends before the mission."""
+        return bool(self.failure) or self.interrupted
+
+    @property
+    def reason(self) -> str:
+        """Return the engine's reason for an incomplete mission, "" without one."""
+        if self.interrupted:
+            return "interrupted by the user"
+        return self.failure or self.abort_reason

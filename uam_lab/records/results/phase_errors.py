@@ -1,0 +1,67 @@
+"""Errors phase by phase, and those of the trajectory alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import POSITION
+from uam_lab.records.results.timeseries import Series
+
+TRAJECTORY = "trajectory"  # phase of the scenario at its full speed
+
+
+def by_phase(series: Series, groups: tuple[tuple[str, slice, float], ...]) -> list[dict[str, Any]]:
+    """Return the figures of every phase of the flight, in order of their begins.
+
+    groups: see `metrics.GROUPS`. A phase that returns, after a hold, is one entry; seconds: its
+    length in all.
+    """
+    order = dict.fromkeys(name for name, _, _ in series.phase_spans())
+    masks = {name: series.flown & series.in_phase(name) for name in order}
+    return [
+        {"phase": name} | figures(series, mask, groups)
+        for name, mask in masks.items()
+        if mask.any()
+    ]
+
+
+def distance(series: Series, rows: np.ndarray) -> np.ndarray:
+    """Return the distance (m,) [m] of the vehicle to the reference at the ticks `rows`, a mask."""
+    return np.linalg.norm(series.block("error.")[rows][:, POSITION], axis=1)
+
+
+def root_mean_square(values: np.ndarray) -> float:
+    """Return the root mean square of values (m,); NaN without any."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+
+
+def figures(
+    series: Series, rows: np.ndarray, groups: tuple[tuple[str, slice, float], ...]
+) -> dict[str, Any]:
+    """Return the figures of the ticks `rows` (ticks,), a mask with one tick or more.
+
+    position_3d_m: root mean square of the distance to the reference; largest_3d_m: largest
+    distance; tilt_deg, thrust_n: largest true tilt, and largest sum of the rotors' thrusts.
+    """
+    error, times = series.block("error.")[rows], series.time[rows]
+    away = distance(series, rows)
+    thrust = sum(
+        series[name][rows]
+        for name in series.columns.names
+        if name.startswith("rotor_") and name.endswith(".thrust")
+    )
+    period = float(np.median(np.diff(series.time))) if len(series) > 1 else 0.0
+    return {
+        "from_s": round(float(times[0]), 6),
+        "seconds": round(period * len(times), 6),
+        "position_3d_m": root_mean_square(away),
+        "largest_3d_m": float(away.max()),
+        "rms": {
+            key: (factor * np.sqrt(np.mean(error[:, columns] ** 2, axis=0))).tolist()
+            for key, columns, factor in groups
+        },
+        "tilt_deg": float(np.degrees(series.tilt[rows].max())),
+        "thrust_n": float(np.max(thrust)),
+    }

@@ -1,0 +1,174 @@
+"""The line with its servos: instruction packets in, status packets out, with faults.
+
+No thread and no device: `EmulatedBus` puts a line behind a pseudo-terminal, and a test may call it
+directly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_sim_bridge.devices.dynamixel.emulated import packets
+from uam_sim_bridge.devices.dynamixel.emulated.packets import BROADCAST, Packet, PacketReader
+from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
+from uam_sim_bridge.devices.serial.bit_errors import disturbed
+
+PING_SLOT = 0.001  # [s] between answers to a broadcast ping
+
+
+@dataclass
+class BusFaults:
+    """Faults of the line; may be changed while it is used.
+
+    bit_error_rate: of every bit in both directions; loss: of a whole packet in either direction.
+    """
+
+    bit_error_rate: float = 0.0
+    loss: float = 0.0
+
+
+class ServoLine:
+    """Servos on one line; `instructions`: packets understood.
+
+    Servos of one id answer at the same time: their bytes overlap and are damaged. In a Sync Read a
+    servo waits for the one named before it; if that one is silent, so are all after it.
+    """
+
+    def __init__(self, servos: Sequence[EmulatedServo], seed: int = 1) -> None:
+        """seed: of the faults."""
+        self.servos, self.faults, self.instructions = list(servos), BusFaults(), 0
+        self._noise = np.random.default_rng(seed)
+        self._reader = PacketReader()
+
+    @property
+    def damaged(self) -> int:
+        """Number of instruction packets that arrived damaged."""
+        return self._reader.damaged
+
+    def receive(self, data: bytes, speed: int | None) -> Iterator[tuple[float, bytes]]:
+        """Take bytes at a baud rate, None: any; yield (delay [s], bytes) of each answer."""
+        for packet in self._reader.feed(self._disturbed(data)):
+            if self._lost():
+                continue
+            listening = [
+                one for one in self.servos if one.connected and speed in (None, one.baud_rate)
+            ]
+            self.instructions += 1
+            for one in listening:
+                one.tick(heard=True)
+            for delay, answer in self._answers(packet, listening):
+                if not self._lost():
+                    yield delay, self._disturbed(answer)
+
+    def tick(self) -> None:
+        """Let the servos' watchdogs run while the line is silent."""
+        for servo in self.servos:
+            servo.tick(heard=False)
+
+    def cut_behind(self, servo: int) -> None:
+        """Cut the chain behind servo `servo`, 0 for all: the ones after it have no supply."""
+        on = servo != 0
+        for one in self.servos:
+            if not on and one.connected:
+                one.restart()
+            one.connected = on
+            on = on and one.id != servo
+
+    def mend(self) -> None:
+        """Connect every servo again; those without supply have restarted."""
+        for one in self.servos:
+            one.connected = True
+
+    def _lost(self) -> bool:
+        return self.faults.loss > 0.0 and self._noise.random() < self.faults.loss
+
+    def _disturbed(self, data: bytes) -> bytes:
+        """Return `data` with bit errors."""
+        return disturbed(data, self.faults.bit_error_rate, self._noise)
+
+    def _answers(self, packet: Packet, listening: list[EmulatedServo]) -> list[tuple[float, bytes]]:
+        """Execute an instruction; return (delay [s], bytes) of each status packet."""
+        p, code = packet.parameters, packet.instruction
+        if code in (packets.SYNC_READ, packets.FAST_SYNC_READ):
+            return self._sync_read(packet, listening)
+        if code == packets.SYNC_WRITE:
+            self._sync_write(p, listening)
+            return []
+        chosen = [one for one in listening if packet.id in (BROADCAST, one.id)]
+        made = [(one, self._single(one, code, p)) for one in chosen]
+        if packet.id == BROADCAST and code != packets.PING:
+            return []
+        found = [(one, data) for one, data in made if data is not None]
+        if packet.id == BROADCAST:
+            return [(PING_SLOT, data) for _, data in sorted(found, key=lambda pair: pair[0].id)]
+        if len(found) > 1:  # of the same id, at the same time: open-drain, a 0 wins
+            width = max(len(data) for _, data in found)
+            mixed = np.full(width, 0xFF, np.uint8)
+            for shift, (_, data) in enumerate(found):
+                late = bytes([0xFF] * shift) + data
+                mixed &= np.frombuffer(late.ljust(width, b"\xff")[:width], np.uint8)
+            return [(found[0][0].return_delay, mixed.tobytes())]
+        return [(one.return_delay, data) for one, data in found]
+
+    @staticmethod
+    def _single(servo: EmulatedServo, code: int, p: bytes) -> bytes | None:
+        """Execute an instruction for one servo; return its status packet or None."""
+        level, own = servo.get("Status Return Level"), servo.id
+        if code == packets.PING:
+            number, firmware = servo.get("Model Number"), servo.get("Firmware Version")
+            return packets.status(
+                own, servo.alert, number.to_bytes(2, "little") + bytes([firmware])
+            )
+        if code == packets.READ:
+            if len(p) != 4:
+                return packets.status(own, packets.DATA_LENGTH | servo.alert)
+            error, data = servo.read(_word(p), _word(p[2:]))
+            return packets.status(own, error, data) if level >= 1 else None
+        if code == packets.WRITE:
+            error = servo.write(_word(p), p[2:])
+        elif code == packets.REG_WRITE:
+            error = servo.register(_word(p), p[2:])
+        elif code == packets.ACTION:
+            servo.act()
+            error = servo.alert
+        elif code == packets.REBOOT:
+            error = servo.alert
+            servo.restart()
+        else:
+            error = packets.BAD_INSTRUCTION | servo.alert
+        return packets.status(own, error) if level >= 2 else None
+
+    @staticmethod
+    def _sync_write(p: bytes, listening: list[EmulatedServo]) -> None:
+        address, length = _word(p), _word(p[2:])
+        for start in range(4, len(p) - length, 1 + length):
+            data = p[start + 1 : start + 1 + length]
+            for one in listening:
+                if one.id == p[start]:
+                    one.write(address, data)
+
+    @staticmethod
+    def _sync_read(packet: Packet, listening: list[EmulatedServo]) -> list[tuple[float, bytes]]:
+        p = packet.parameters
+        address, length = _word(p), _word(p[2:])
+        answers, by_id = [], {one.id: one for one in listening}
+        for number in p[4:]:
+            if number not in by_id:
+                break
+            one = by_id[number]
+            error, data = one.read(address, length)
+            answers.append((one, error, data))
+        if packet.instruction == packets.SYNC_READ:
+            return [(one.return_delay, packets.status(one.id, e, d)) for one, e, d in answers]
+        if not answers:
+            return []
+        padded = [(one.id, e, d.ljust(length, b"\0")) for one, e, d in answers]
+        parts = packets.fast_status(padded, len(p) - 4)
+        return [(answers[0][0].return_delay, parts[0]), *((0.0, part) for part in parts[1:])]
+
+
+def _word(data: bytes) -> int:
+    return int.from_bytes(data[:2], "little")

@@ -1,0 +1,50 @@
+"""Commands of the joints → goal registers of the servos, within the limits of angle and current."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_sim_bridge.devices.dynamixel.chain import ServoDescription
+from uam_sim_bridge.devices.dynamixel.friction import friction_torque
+from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+
+
+@dataclass(frozen=True)
+class Command:
+    """Efforts (n,) [N m] or goals (n,) [rad], desired velocities (n,) [rad/s], time [s]."""
+
+    values: np.ndarray
+    velocity: np.ndarray
+    time: float
+
+
+def goal_current(
+    servo: ServoDescription,
+    effort: float,
+    velocity: float,
+    angle: float,
+    parameters: ArmDriverParameters,
+) -> int:
+    """Return the register Goal Current of a joint.
+
+    effort [N m]; velocity [rad/s]: desired; angle [rad]: measured. An effort that drives further
+    into a limit of the angle is removed.
+    """
+    if parameters.friction_compensation:
+        effort += friction_torque(servo.coulomb, servo.viscous, velocity, parameters.friction_speed)
+    if (angle >= servo.high and effort > 0.0) or (angle <= servo.low and effort < 0.0):
+        return 0
+    return servo.current(effort)
+
+
+def goal_position(servo: ServoDescription, goal: float, turns: int) -> int | None:
+    """Return the register Goal Position of a goal [rad] within the limits; None for NaN.
+
+    turns [counts]: see `ServoDescription.turned`.
+    """
+    if math.isnan(goal):
+        return None
+    return servo.counts(min(max(goal, servo.low), servo.high)) - turns

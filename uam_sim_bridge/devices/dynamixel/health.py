@@ -1,0 +1,65 @@
+"""Health of the servos and of the bus, for /diagnostics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from uam_sim_bridge.devices.dynamixel.hardware_errors import advice
+
+
+@dataclass
+class ServoHealth:
+    """What the driver last read of one servo, and counts since the start.
+
+    temperature [deg C] and voltage [V]: NaN until read; error: Hardware Error Status; torque_on: as
+    last read; misses: reads without an answer; in_a_row: of them the newest; lost: missed_reads
+    in a row; restarts: losses of torque without error; trips: of the watchdog.
+    """
+
+    label: str
+    joint: str
+    temperature: float = math.nan
+    voltage: float = math.nan
+    error: int = 0
+    torque_on: bool = False
+    misses: int = 0
+    in_a_row: int = 0
+    lost: bool = False
+    restarts: int = 0
+    trips: int = 0
+
+    @property
+    def problem(self) -> str:
+        """The servo's problem in one line, "" without one."""
+        if self.lost:
+            return f"{self.label}: no answer to the last {self.in_a_row} reads: cable, supply, id?"
+        return f"{self.label}: {advice(self.error)}" if self.error else ""
+
+
+class CycleMeter:
+    """Measures rate and duration of the cycles between two reports."""
+
+    def __init__(self) -> None:
+        self._first = self._last = math.nan
+        self._cycles, self._busy, self._longest = 0, 0.0, 0.0
+
+    def add(self, begun: float, ended: float) -> None:
+        """Count a cycle from `begun` to `ended` [s]."""
+        if math.isnan(self._first):
+            self._first = begun
+        self._last = begun
+        self._cycles += 1
+        self._busy += ended - begun
+        self._longest = max(self._longest, ended - begun)
+
+    def report(self) -> tuple[float, float, float]:
+        """Return rate [Hz], mean and longest duration [s] since the last report; NaN: unknown."""
+        if not self._cycles:
+            return math.nan, math.nan, math.nan
+        span = self._last - self._first
+        rate = (self._cycles - 1) / span if span > 0.0 else math.nan
+        found = rate, self._busy / self._cycles, self._longest
+        self._first = self._last
+        self._cycles, self._busy, self._longest = 1, found[1], 0.0
+        return found

@@ -1,0 +1,197 @@
+"""Frames of a tracking system → stamped poses of vehicle and payload, and the health of both."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.stamps import SECOND
+from uam_sim_bridge.devices.mocap.calibration import Calibration
+from uam_sim_bridge.devices.mocap.clock_offset import ClockOffset
+from uam_sim_bridge.devices.mocap.frame import Frame, MocapError, MocapSource
+from uam_sim_bridge.devices.mocap.frame_count import FrameCount
+from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
+
+START_TIME = 3.0  # [s] for a server that is there to send the list of its bodies
+WINDOW = 240  # frames of the latency that is reported
+LATEST = SECOND  # [ns] a pose that is older was stamped by a clock that was set
+
+
+class Level(Enum):
+    """How much of the poses arrives."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class StampedPose(NamedTuple):
+    """stamp [ns] of the exposure, host's clock; position (3,) [m, ENU]; quaternion (4,) FLU → ENU.
+
+    payload: whose pose it is, the payload's or the vehicle's.
+    """
+
+    payload: bool
+    stamp: int
+    position: np.ndarray
+    quaternion: np.ndarray
+
+
+class MocapDriver:
+    """Converts, stamps and counts.
+
+    Nothing is delivered for a body that is not tracked or not known: its topic falls silent, which
+    the supervisor sees as lost motion capture.
+    """
+
+    def __init__(
+        self, parameters: MocapParameters, calibration: Calibration, source: MocapSource
+    ) -> None:
+        self._parameters, self._source = parameters, source
+        self._calibrations = {parameters.body: calibration}
+        if parameters.payload:
+            self._calibrations[parameters.payload] = calibration.without_body()
+        self._nominal = not calibration.measured
+        self.clock, self.count = ClockOffset(), FrameCount()
+        self._sessions = 0
+        self._untracked = dict.fromkeys(self._calibrations, 0)
+        self._last_pose = dict.fromkeys(self._calibrations, -math.inf)  # time.monotonic() [s]
+        self._last_frame = -math.inf
+        self._stamp = 0  # [ns] of the newest frame
+        self._latencies: deque[float] = deque(maxlen=WINDOW)  # [s]
+
+    def check_names(self) -> None:
+        """Wait for the list of bodies; raise MocapError if a body is not in it.
+
+        A server that does not answer is no error: it may be started later.
+        """
+        deadline = time.monotonic() + START_TIME
+        while self._source.names is None and time.monotonic() < deadline:
+            self._source.frames(0.05)
+        if self._parameters.source == "natnet" and (missing := self._missing()):
+            raise MocapError(missing)
+
+    def close(self) -> None:
+        """Close the source."""
+        self._source.close()
+
+    def receive(self, timeout: float) -> list[StampedPose]:
+        """Return the poses that have arrived; wait at most `timeout` [s] for a packet."""
+        return [pose for frame in self._source.frames(timeout) for pose in self.take(frame)]
+
+    def take(self, frame: Frame) -> list[StampedPose]:
+        """Return the poses of a frame; none of a frame that is repeated or late."""
+        if self._source.sessions != self._sessions:
+            self._sessions = self._source.sessions
+            self.count.restart()
+            self.clock.restart()
+        if frame.number is not None and not self.count.take(frame.number):
+            return []
+        if frame.number is None:
+            self.count.received += 1
+        stamp = self._stamped(frame)
+        self._last_frame = now = time.monotonic()
+        found = []
+        for name, calibration in self._calibrations.items():
+            pose = frame.bodies.get(name)
+            if pose is None:
+                self._untracked[name] += name in frame.bodies
+                continue
+            self._last_pose[name] = now
+            payload = name != self._parameters.body
+            found.append(StampedPose(payload, stamp, *calibration.convert(pose)))
+        return found
+
+    def _stamped(self, frame: Frame) -> int:
+        """Return the stamp [ns] of the exposure; stamps never go back, except after a set clock."""
+        arrival = frame.arrival / SECOND
+        if frame.exposed is None:
+            exposed = arrival - self._parameters.assumed_latency
+        else:
+            sent = frame.sent if frame.sent is not None else frame.exposed
+            jumps = self.clock.jumps
+            self.clock.add(sent, arrival)
+            exposed = self.clock.host(frame.exposed)
+            if jumps != self.clock.jumps:
+                self._latencies.clear()
+        stamp = round(exposed * SECOND)
+        if self._stamp - LATEST < stamp <= self._stamp:
+            stamp = self._stamp + 1000
+        self._stamp = stamp
+        self._latencies.append(arrival - exposed)
+        return stamp
+
+    def _missing(self) -> str:
+        """Return one line about a body that the server does not know, "" if it knows all."""
+        names = self._source.names
+        if names is None:
+            return ""
+        for name in self._calibrations:
+            if name not in names:
+                there = ", ".join(sorted(names)) or "none"
+                return f"no rigid body '{name}' in {self._source.description}; there are: {there}"
+        return ""
+
+    def health(self) -> tuple[Level, str]:
+        """Return the level and one line."""
+        now, limit = time.monotonic(), self._parameters.silent_after
+        source = self._source
+        why = source.failure
+        if not source.connected:
+            more = f" ({why})" if why else "; is it on, and does it stream?"
+            return Level.ERROR, f"no answer of {source.description}{more}"
+        if source.names is None and why:
+            return Level.ERROR, (
+                f"the list of bodies of {source.description} cannot be read: {why}; "
+                "stream rigid bodies only"
+            )
+        if missing := self._missing():
+            return Level.ERROR, missing
+        if now - self._last_frame > limit:
+            return Level.ERROR, f"no frames from {source.description}; is it paused?"
+        body = self._parameters.body
+        if now - self._last_pose[body] > limit:
+            return (
+                Level.ERROR,
+                f"body '{body}' is not tracked: markers hidden or out of sight",
+            )
+        if self._nominal:
+            return Level.WARN, (
+                f"calibration {self._parameters.calibration} is nominal, not measured: "
+                "uam calibrate-mocap"
+            )
+        payload = self._parameters.payload
+        if payload and now - self._last_pose[payload] > limit:
+            return Level.WARN, f"body '{payload}' is not tracked"
+        return Level.OK, f"poses of '{body}' from {source.description}"
+
+    def values(self) -> dict[str, object]:
+        """Return the values for /diagnostics."""
+        ordered = sorted(self._latencies)
+        offset = self.clock.value
+        return {
+            "connected to": self._source.description,
+            "frames": self.count.received,
+            "frames lost": self.count.lost,
+            "frames repeated": self.count.repeated,
+            "frames late": self.count.late,
+            "packets unreadable": self._source.bad,
+            "connections": self._source.sessions,
+            **{f"not tracked: {name}": n for name, n in self._untracked.items()},
+            "latency median [ms]": _milliseconds(ordered, 0.5),
+            "latency p99 [ms]": _milliseconds(ordered, 0.99),
+            "clock offset [s]": None if offset is None else f"{offset:.6f}",
+            "clock drift [ppm]": f"{1e6 * self.clock.drift:.1f}",
+            "clock jumps": self.clock.jumps,
+        }
+
+
+def _milliseconds(ordered: list[float], part: float) -> str | None:
+    if not ordered:
+        return None
+    return f"{1e3 * ordered[min(int(part * len(ordered)), len(ordered) - 1)]:.2f}"

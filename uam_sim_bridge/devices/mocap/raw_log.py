@@ -1,0 +1,46 @@
+"""Recorded poses of one rigid body in the tracker's axes, as CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.settings.csv_table import CsvTable
+from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
+from uam_sim_bridge.devices.mocap.measurement import TimedPose
+
+COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")  # s, m
+
+
+def write(file: Path, poses: Sequence[TimedPose]) -> None:
+    """Write the poses; raises OSError."""
+    with file.open("w", newline="", encoding="utf-8") as out:
+        rows = csv.writer(out)
+        rows.writerow(COLUMNS)
+        for time, (position, quaternion) in poses:
+            numbers = *position, *quaternion
+            rows.writerow([f"{time:.6f}", *(f"{number:.9g}" for number in numbers)])
+
+
+def read(file: Path) -> list[TimedPose]:
+    """Read the poses; raises MocapError with the line."""
+    table = CsvTable(file, MocapError)
+    missing = [name for name in COLUMNS if name not in table.header]
+    if missing:
+        needed = f"no column {', '.join(missing)}; needed: {','.join(COLUMNS)}"
+        raise table.error(table.header_line, needed)
+    found: list[TimedPose] = []
+    for line, numbers in zip(table.lines, table.numbers(COLUMNS), strict=True):
+        quaternion = np.array(numbers[4:])
+        norm = math.sqrt(quaternion @ quaternion)
+        if not 0.9 < norm < 1.1:
+            raise table.error(line, f"not a pose: the quaternion's norm is {norm:.3g}")
+        if found and numbers[0] <= found[-1].time:
+            raise table.error(line, "t does not grow")
+        pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
+        found.append(TimedPose(numbers[0], pose))
+    return found

@@ -1,1 +1,0 @@
-"""Emulated hardware with the real protocols, for tests and rehearsals."""

@@ -1,1 +1,0 @@
-"""A GPIO line without hardware."""

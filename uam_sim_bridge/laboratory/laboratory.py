@@ -1,0 +1,242 @@
+"""The laboratory: a plant behind emulated devices, tick by tick. No ROS.
+
+    motors ◀─ HIL over TCP or a line ─▶ autopilot ◀─ serial cable ─▶ bridge
+    joints ◀─▶ emulated Dynamixel bus ◀─ pseudo-terminal ─▶ arm_driver
+    poses ──▶ emulated NatNet server ──▶ mocap_driver
+    magnet ◀── simulated GPIO line ◀── magnet_driver
+
+The plant's own delays of sensors and commands are off where a device has its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, POSITION
+from uam_control.vehicle import POSITION_SERVO, VehicleDescription
+from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
+from uam_sim_bridge.devices.dynamixel.emulated import ArmShafts, EmulatedBus, EmulatedServo
+from uam_sim_bridge.devices.dynamixel.startup import required_mode
+from uam_sim_bridge.devices.mocap.calibration import Calibration
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer
+from uam_sim_bridge.devices.serial.serial_cable import SerialCable
+from uam_sim_bridge.faults.schedule import Schedule
+from uam_sim_bridge.laboratory import hands
+from uam_sim_bridge.laboratory.hil_line import HilLine
+from uam_sim_bridge.laboratory.tracked_room import RoomBody
+from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain, mistaken_room
+from uam_sim_bridge.mavlink.hil.hil_server import HilServer
+from uam_sim_bridge.plant import Samples, Truth, Vehicle
+from uam_sim_bridge.plant.engines import plant_class
+
+ADAPTER_LATENCY = 0.001  # [s] latency timer of the servo bus's adapter
+OWN_DELAYS = {  # those that the emulated devices have
+    "sensors.mocap.latency_ticks": 0,
+    "sensors.joints.latency_ticks": 0,
+    "servos.command_latency_ticks": 0,
+}
+CONTROLS_OF_ACTUATORS = 6  # the last ones of HIL_ACTUATOR_CONTROLS
+# in the folder; USB: sensors and motors of an autopilot in HITL
+BUS_DEVICE, SERIAL_NEAR, SERIAL_FAR, USB = "ttyARM", "ttyTELEM2", "ttyAUTOPILOT", "ttyUSB"
+
+
+@dataclass(frozen=True)
+class Devices:
+    """The devices of a lab file, as emulated.
+
+    folder: of the pseudo-terminals; chain: servos as described; baud: of the autopilot's line;
+    body, payload: rigid bodies, payload "" for none; mocap_port: command port; magnet_line: file of
+    the GPIO line, None where the autopilot switches; magnet_output: actuator 1..6; magnet_on,
+    magnet_off: its values; usb: sensors and motors go over a line, not over TCP.
+    """
+
+    folder: Path
+    chain: ArmChain
+    baud: int
+    body: str
+    payload: str
+    calibration: Calibration
+    mocap_port: int
+    magnet_line: Path | None
+    active_low: bool = False
+    magnet_output: int = 1
+    magnet_on: float = 1.0
+    magnet_off: float = -1.0
+    usb: bool = False
+
+
+class Laboratory:
+    """Plant and devices; `step` advances one control period.
+
+    `bus`, `cable`, `mocap`, `hil`: the devices; `grip`: the person's hands; `folded` (n,): the
+    arm at the start [rad], as which hands hold it until the servos are first driven.
+    Cables are pulled by `cables.Cables`.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        devices: Devices,
+        hil_port: int,
+        payload_mass: float,
+        seed: int,
+        arm_start: Sequence[float] = (),
+        wiring: Schedule | None = None,
+        plant: str = "mujoco",
+    ) -> None:
+        """wiring: mistakes of the set-up. Raises OSError (port in use), PlantError, FaultError."""
+        latency = vehicle.numbers["sensors"]["mocap"]["latency_ticks"]
+        vehicle = vehicle.changed(OWN_DELAYS)
+        self.description: VehicleDescription = vehicle.description
+        start = tuple(arm_start)
+        self.plant = plant_class(plant)(vehicle, payload_mass, seed, start)
+        warm_up(plant_class(plant)(vehicle, payload_mass, seed, start))
+        self.devices = devices
+        self.wiring = wiring or Schedule()
+        self.grip = hands.Grip()
+        self.folded = np.array(start or vehicle.description.stowed, dtype=float)
+        self._driven = False  # whether the servos have had a command
+        self._weight = vehicle.numbers["mass"] * vehicle.numbers["gravity"]
+        self._in_position_mode = vehicle.numbers["servos"]["mode"] == POSITION_SERVO
+        chain, mounted = devices.chain, mistaken_chain(devices.chain, self.wiring)
+        self.shafts = ArmShafts(mounted)
+        self._hand = np.zeros(len(mounted))  # (n,) [N m] of the person on the joints
+        self._turn_shafts(self.plant.truth())
+        mode = required_mode(vehicle.numbers["servos"]["mode"])
+        self.servos = servos_of(chain, mounted, self.shafts, mode)
+        self.bus = EmulatedBus(
+            self.servos,
+            timing=True,
+            latency_timer=ADAPTER_LATENCY,
+            seed=seed,
+            link=devices.folder / BUS_DEVICE,
+        )
+        near, far = devices.folder / SERIAL_NEAR, devices.folder / SERIAL_FAR
+        self.cable = SerialCable(near, far, devices.baud, seed)
+        self.mocap = MocapServer(
+            mistaken_room(self._bodies(), self.wiring),
+            rate=1.0 / self.plant.period,  # the plant's own rate decides
+            port=devices.mocap_port,
+            disturbances=Disturbances(latency=max(0.0005, latency * self.plant.period)),
+            seed=seed,
+        )
+        rotors = len(self.description.rotors)
+        if devices.usb:
+            self.hil: HilServer | HilLine = HilLine(devices.folder / USB, rotors, seed)
+        else:
+            self.hil = HilServer(hil_port, rotors, seed=seed)
+        self.hil_plugged = self.magnet_plugged = True
+        self.magnet = False
+        self.mocap.start()
+
+    def _bodies(self) -> list[RoomBody]:
+        """Return the bodies in the order of the server's list: vehicle, payload."""
+        d = self.devices
+        found = [RoomBody(d.body, d.calibration)]
+        if d.payload:
+            found.append(RoomBody(d.payload, d.calibration.without_body()))
+        return found
+
+    def sense(self, host: float) -> tuple[Samples, Truth]:
+        """Sample the sensors of this tick; expose the cameras at `host` [s], system's time."""
+        samples, truth = self.plant.sense(), self.plant.truth()
+        self._turn_shafts(truth)
+        if samples.mocap is not None:
+            d = self.devices
+            exposed = host + samples.mocap[0] - self.plant.time
+            poses = {d.body: samples.mocap[1:]}
+            if d.payload and samples.payload is not None:
+                poses[d.payload] = samples.payload[1:]
+            self.mocap.expose(exposed, poses)
+        return samples, truth
+
+    def send_hil(self, samples: Samples, truth: Truth) -> None:
+        """Send the autopilot its sensors, unless its link is pulled."""
+        if self.hil_plugged:
+            now, gyro, force = samples.hil
+            self.hil.send(now, gyro, force, truth.state[CHI, POSITION], truth.quaternion)
+
+    def receive_hil(self) -> np.ndarray:
+        """Return the motor commands (rotors,) 0..1; zeros while the link is pulled."""
+        motors = self.hil.receive(0.0)
+        return motors if self.hil_plugged else np.zeros_like(motors)
+
+    def step(self, motors: np.ndarray, truth: Truth) -> None:
+        """Advance one control period with the commands of the devices."""
+        self.magnet = self._switched()
+        command = self.shafts.command(self._in_position_mode)
+        self._driven = self._driven or bool(np.any(np.nan_to_num(command)))
+        joints = self.grip.joints
+        if joints is None and not self._driven:
+            joints = self.folded
+        self._hand = hands.joint_torque(hands.Grip(joints=joints), truth.state)
+        if self._in_position_mode:
+            if joints is not None:
+                command = np.where(np.isnan(command), joints, command)
+        else:
+            command = command + self._hand
+        self.plant.push(*hands.wrench(self.grip, truth.state, self._weight))
+        self.plant.step(motors, command, self.magnet)
+
+    def _turn_shafts(self, truth: Truth) -> None:
+        """Give the servos angles, velocities and torques of this tick."""
+        torque = self.plant.servos.torque - self._hand
+        self.shafts.set(truth.state[CHI, ALPHA:], truth.state[CHI_DOT, ALPHA:], torque)
+
+    def _switched(self) -> bool:
+        """Return whether current flows through the magnet."""
+        if not self.magnet_plugged:
+            return False
+        d = self.devices
+        line = d.magnet_line
+        if line is None:
+            first = len(self.hil.controls) - CONTROLS_OF_ACTUATORS
+            value = self.hil.controls[first + d.magnet_output - 1]
+            return bool(abs(value - d.magnet_on) < abs(value - d.magnet_off))
+        try:
+            level = line.read_text(encoding="utf-8") == "1"
+        except OSError:
+            return False
+        inverted = any(one.fault.NAME == "magnet_inverted" for one in self.wiring.faults)
+        return (level is not d.active_low) is not inverted
+
+    def close(self) -> None:
+        """Close every device."""
+        self.hil.close()
+        self.mocap.stop()
+        self.cable.close()
+        self.bus.close()
+
+
+def servos_of(
+    chain: ArmChain, mounted: Sequence[ServoDescription], shafts: ArmShafts, mode: int
+) -> list[EmulatedServo]:
+    """Return the servos in the order of the joints, set up as described; mode: Operating Mode."""
+    made = []
+    for servo, shaft in zip(mounted, shafts.shafts, strict=True):
+        one = EmulatedServo(
+            servo.id,
+            shaft,
+            servo.table.model,
+            chain.baud_rate,
+            current_unit=servo.current_unit,
+        )
+        one.set(names.RETURN_DELAY, chain.return_delay_counts)
+        one.set(names.OPERATING_MODE, mode)
+        one.set(names.CURRENT_LIMIT, servo.current_limit_counts)
+        made.append(one)
+    return made
+
+
+def warm_up(spare: object) -> None:
+    """Compile the functions of a tick with a spare plant: a first call takes long."""
+    rotors = len(spare.vehicle.description.rotors)
+    for _ in range(10):
+        spare.sense()
+        spare.truth()
+        spare.step(np.zeros(rotors), np.zeros(spare.joints), False)

@@ -1,0 +1,59 @@
+"""What the cameras see of a body, for any calibration: the inverse of the driver's conversion.
+
+    R_tr = R_wtᵀ R_wb R_rbᵀ        p_t = R_wtᵀ (p_b + origin + R_wb pivot)
+
+w world, t tracker, b base_link, r rigid body; see `drivers.mocap.calibration`. A wrong set-up shows
+something else: another upward axis, or a rigid body made with another heading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.maths.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_euler,
+    quaternion_multiply,
+)
+from uam_sim_bridge.devices.mocap.calibration import UPRIGHT, Calibration, conjugate
+
+
+@dataclass
+class RoomBody:
+    """A rigid body of the server; other_axis: streamed with the other upward axis.
+
+    turn [rad]: the nose pointed so far to the left of the calibration's when the body was made.
+    """
+
+    name: str
+    calibration: Calibration
+    other_axis: bool = False
+    turn: float = 0.0
+
+    def seen(
+        self, position: np.ndarray, quaternion: np.ndarray
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return position x y z [m] and rotation x y z w as streamed.
+
+        position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, of base_link.
+        """
+        c = self.calibration
+        back = conjugate(c.world)
+        pivot = matrix_from_quaternion(quaternion) @ np.array(c.pivot)
+        at = matrix_from_quaternion(back) @ (position + np.array(c.origin) + pivot)
+        turned = quaternion_multiply(back, quaternion_multiply(quaternion, _inverse(c.body)))
+        if self.turn:
+            made = quaternion_from_euler(np.array([0.0, 0.0, self.turn]))
+            made = quaternion_multiply(back, quaternion_multiply(made, c.world))
+            turned = quaternion_multiply(turned, conjugate(made))
+        if self.other_axis:
+            other = UPRIGHT["y"] if c.up == "y" else conjugate(UPRIGHT["y"])
+            at = matrix_from_quaternion(other) @ at
+            turned = quaternion_multiply(other, quaternion_multiply(turned, conjugate(other)))
+        return tuple(at.tolist()), (*turned[1:].tolist(), float(turned[0]))
+
+
+def _inverse(quaternion: tuple[float, ...]) -> np.ndarray:
+    return conjugate(np.array(quaternion))

@@ -1,1 +1,0 @@
-"""tau_p and tau_q → setpoint; OFFBOARD, arming, level hold."""
