@@ -36,4 +36,4 @@ def __getattr__(name: str) -> Any:
     """Return an offered name."""
     if name not in OFFERED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.library.{OFFERED[name]}"), name)
+    return getattr(importlib.import_module(f"{__name__}.flights.library.{OFFERED[name]}"), name)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control import frames
 from uam_control.maths.rotations import (
     euler_from_quaternion,
     matrix_from_quaternion,
     quaternion_from_euler,
 )
-from uam_sim_bridge.mavlink.protocol import frames
 
 small = st.floats(-100.0, 100.0)
 vectors = st.tuples(small, small, small).map(np.array)

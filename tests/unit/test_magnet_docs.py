@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-from uam_sim_bridge.mavlink.offboard import autopilot_magnet
 
+from uam_control.offboard import autopilot_magnet
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.modes import MavCmd
 from uam_sim_bridge.devices.magnet.switching import SwitchingParameters

@@ -35,7 +35,7 @@ def difference(expected: Mapping[str, str], found: Mapping[str, str]) -> str:
 
 
 def _digest() -> str:
-    top = Path(__file__).resolve().parents[2]
+    top = Path(__file__).resolve().parents[3]
     files = [
         (file.relative_to(top).as_posix(), file)
         for package in PACKAGES
