@@ -248,7 +248,7 @@ class MavlinkBridgeNode(UamNode):
         self.done_tick(stamp, begun)
 
     def _late_by(self, stamp: int) -> float:
-        """Return for how long [s] the tick `stamp` [ns] has waited for a process that stood still."""
+        """Return for how long [s] the tick `stamp` [ns] has waited; 0 in lockstep."""
         if self._options.clock != "realtime":
             return 0.0
         return self._waited.late(stamp / SECOND, time.monotonic())
