@@ -158,7 +158,9 @@ def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
     assert not flight.mission.output.magnet
 
 
-@pytest.mark.parametrize("text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4"])
+@pytest.mark.parametrize(
+    "text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4", "mavlink_cut@take-off+0.4"]
+)
 @pytest.mark.parametrize("seed", [1, 2, 6])
 def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
     flight, series, figures = flown(text, seed=seed)
