@@ -12,7 +12,7 @@ import math
 from uam_control.maths.compiled import jit
 
 # [s], in order of their size
-AHEAD = 0.05  # a pose may be this far ahead of the IMU: more is an error of its clock
+AHEAD = 0.05  # a pose may be so far ahead of the IMU, or behind the last one: more is a wrong clock
 STALE = 0.1  # commands, and a bias of the IMU: no longer valid
 FORWARDED = 0.25  # poses: to the autopilot, and in the comparisons of supervisor and grasp
 HOLD = 0.25  # poses, joint angles, gains of a controller: the vehicle holds, then lands

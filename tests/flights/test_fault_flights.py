@@ -158,13 +158,29 @@ def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
     assert not flight.mission.output.magnet
 
 
-@pytest.mark.parametrize("text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4"])
+@pytest.mark.parametrize(
+    "text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4", "mavlink_cut@take-off+0.4"]
+)
 @pytest.mark.parametrize("seed", [1, 2, 6])
 def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
     flight, series, figures = flown(text, seed=seed)
     assert classify(series, figures) == "failsafe" and not flight.armed
     up = series["truth.z"] - series["truth.z"][0] > 0.02
     assert np.count_nonzero(np.diff(up.astype(int)) == 1) == 1  # one lift-off
+
+
+@pytest.mark.parametrize(
+    ("text", "seed", "outcome"),
+    [
+        ("clock_jump@take-off:step=-0.219", 5, "failsafe"),  # 180 deg, 2.4 m/s
+        ("clock_jump@take-off+1.434+1.0:step=-0.378", 3, "completed"),  # 1.3 m/s
+        ("clock_jump@take-off+0.4:step=0.2", 2, "failsafe"),
+    ],
+)
+def test_poses_of_a_wrong_clock_are_missing_poses(text, seed, outcome):
+    _, series, figures = flown(text, scenario=QUICK_PICK, seed=seed)
+    assert classify(series, figures) == outcome
+    assert ending(series).largest_tilt < 0.2
 
 
 def test_late_poses_do_no_harm():

@@ -355,3 +355,24 @@ def test_the_band_is_solved_as_by_singular_values(seed, count):
         row[j : j + width] = part
     expected = np.linalg.lstsq(whole, target)[0]
     np.testing.assert_allclose(_band_solved(first, band, target, n), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("field", ["1_0", "٣", "0x1", "nan", "1e400", "\x000.5", "0,5"])
+def test_a_field_that_other_programs_read_otherwise_is_refused(tmp_path, field):
+    rows = ["0,0,0,1", f'1,"{field}",0,1', "2,0,0,1"]
+    with pytest.raises(ScenarioError, match="line 3 column px: .* is not a finite number"):
+        load_scenario(csv_file(tmp_path, "t,px,py,pz", rows))
+
+
+def test_a_value_beyond_every_room_is_refused_before_the_fit(tmp_path):
+    rows = ["0,0,0,1", "1,1e308,0,1", "2,0,0,1"]
+    with pytest.raises(ScenarioError, match="line 3 column px: beyond 1e"):
+        load_scenario(csv_file(tmp_path, "t,px,py,pz", rows))
+
+
+def test_times_in_ms_of_a_short_race_show_in_its_speed(tmp_path):
+    times = np.linspace(0.0, 3.0, 61)
+    table = np.column_stack([times, race(times, 5.0)])[:, :4]
+    table[:, 0] *= 1e3
+    with pytest.raises(ScenarioError, match="3000 s, but never faster than 0.005 m/s.*in seconds"):
+        load_scenario(csv_file(tmp_path, "t,px,py,pz", text(table)))

@@ -18,3 +18,12 @@ def test_arming_again_continues_the_flight():
     settled.over(1.0, armed=False)
     assert not settled.over(6.0, armed=True)
     assert not settled.over(7.0, armed=False)
+
+
+def test_after_the_mission_the_flight_goes_on_until_the_autopilot_has_disarmed():
+    assert Settled().after_mission(50.0, armed=False)
+    settled = Settled()
+    assert not settled.after_mission(50.0, armed=True)
+    assert not settled.after_mission(58.0, armed=True)
+    assert settled.after_mission(59.0, armed=False)
+    assert settled.after_mission(65.0, armed=True), "15 s, and it lands no more"

@@ -49,25 +49,26 @@ def test_a_new_simulation_begins_anew():
 
 
 @given(st.floats(0.11, 5.0), st.lists(st.floats(0.0, 0.09), max_size=20))
-def test_ticks_that_waited_for_a_stopped_process_are_old(stopped, steps):
-    """They come in bursts, the newest of each is a tick; one that has come in time is not old."""
+def test_ticks_that_waited_for_a_stopped_process_are_late(stopped, steps):
+    """They come in bursts, the newest of each is a tick; one that has come in time is not late."""
     waited, wall, stamp = Waited(), 100.0, 0.0
     for _ in range(50):
         stamp, wall = stamp + 0.004, wall + 0.004
-        assert not waited.old(stamp, wall)
+        assert not waited.late(stamp, wall)
     wall += stopped
     for step in steps:
         wall, stamp = wall + step, stamp + step + 0.03
         age = wall - 100.0 - stamp
-        assert waited.old(stamp, wall) is (age > STALE) or abs(age - STALE) < 1e-6
-    assert not waited.old(max(stamp, wall - 100.0), wall)
+        late = age if age > STALE else 0.0
+        assert waited.late(stamp, wall) == pytest.approx(late) or abs(age - STALE) < 1e-6
+    assert not waited.late(max(stamp, wall - 100.0), wall)
 
 
-def test_no_tick_is_old_if_the_time_of_the_stamps_stood_still():
+def test_no_tick_is_late_if_the_time_of_the_stamps_stood_still():
     waited, wall, stamp = Waited(), 100.0, 0.0
     found = []
     for tick in range(100):
         stamp, wall = stamp + 0.004, wall + (5.0 if tick == 10 else 0.004)
-        found.append(waited.old(stamp, wall))
+        found.append(waited.late(stamp, wall) > 0.0)
     assert not any(found[:10]) and sum(found) == pytest.approx(STALE / 0.004, abs=1)
-    assert not any(found[40:]) and not waited.old(0.0, wall + 0.004 - stamp)
+    assert not any(found[40:]) and not waited.late(0.0, wall + 0.004 - stamp)

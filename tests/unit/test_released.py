@@ -374,8 +374,8 @@ def test_after_a_frozen_bridge_the_vehicle_is_the_autopilots_until_its_reports_a
     sequence = flight.sequence
     sequence.begin(flight.time, 1.0)
     assert not sequence.released
-    for _ in range(10):  # old ticks, which have waited
-        sequence.begin(flight.time, 1.0, old=True)
+    for _ in range(10):  # ticks that have waited
+        sequence.begin(flight.time, 1.0, late=0.5)
         assert sequence.withheld and not sequence.released
         flight.run(PERIOD, OFFBOARD, streams=False)
     flight.tick += 1250
@@ -394,6 +394,18 @@ def test_after_a_frozen_bridge_the_vehicle_is_the_autopilots_until_its_reports_a
     assert not sequence.withheld and sequence.after_loss
     flight.run(PERIOD, OFFBOARD)
     assert sequence.phase is Phase.FLYING and not sequence.after_loss
+
+
+@pytest.mark.parametrize("late", [1.05, 2.0])
+def test_a_late_tick_knows_that_the_stream_was_lost(late):
+    """Stamps of 0.2 s after the last setpoint; the autopilot's report is newer, by `late`."""
+    flight = Ticks()
+    flight.tick += 50
+    flight.sequence.begin(flight.time, 1.0, late)
+    flight.run(PERIOD, FAILSAFE, streams=False)
+    assert flight.sequence.after_loss
+    holder = "the autopilot's failsafe after a lost stream of setpoints"
+    assert flight.sequence.released_to.startswith(holder)
 
 
 def test_a_gap_within_the_loss_time_or_on_purpose_is_none():

@@ -126,3 +126,50 @@ def test_bad_scenario_is_refused(tmp_path, text, reason):
 def test_unknown_scenario_lists_the_known_ones():
     with pytest.raises(ScenarioError, match="hover.*pick_and_place"):
         load_scenario("nonsense")
+
+
+TIMED = """description: up
+phases: [{from: 0, name: up}]
+moves: [{coordinate: z, from: 0, until: 4, to: 1}]
+landing: {at: 12, duration: 5}
+payload: {mass: 0.1}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("duration: 5", "duration: 5, drop: 1", "landing.drop: unknown; allowed: at, duration"),
+        ("to: 1", "to: 1, form: 2", r"moves\[0\].form: unknown; allowed: coordinate, from"),
+        ("mass: 0.1", "mass: 0.1, droppoint: [0, 1]", "payload.droppoint: unknown"),
+        ("payload: {mass: 0.1}", "payload: 0", "payload: a mapping expected, got 0"),
+        (", name: up", "", r"phases\[0\].name is missing"),
+        ("name: up", "name: [a, b]", r"phases\[0\].name: a name expected"),
+        ("description: up", "description: [1]", "description: a name expected"),
+        ("duration: 5", "duration: 1e-300", "landing.duration: 1e-300 s is below 0.001 s"),
+        ("until: 4", "until: 1e-9", r"moves\[0\].until: 1e-09 s is not 0.001 s after from, 0 s"),
+        ("payload:", '"pay\\nload\\e":', "pay␊load␛: not an entry"),
+    ],
+)
+def test_an_entry_that_nothing_reads_is_refused(tmp_path, old, new, reason):
+    file = tmp_path / "made.yml"
+    file.write_text(TIMED)
+    assert load_scenario(str(file)).landing.at == 12.0
+    file.write_text(TIMED.replace(old, new))
+    with pytest.raises(ScenarioError, match=f"made.yml: {reason}"):
+        load_scenario(str(file))
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("folder.csv", "folder.csv is no file"),
+        ("gone.csv", "gone.csv does not exist"),
+        ("path.txt", "path.txt: a name that ends in .yaml, .yml, .csv expected"),
+    ],
+)
+def test_a_file_that_is_no_scenario_is_refused_by_its_name(tmp_path, name, reason):
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "path.txt").write_text("t,px,py,pz\n0,0,0,1\n1,0,0,1\n")
+    with pytest.raises(ScenarioError, match=reason):
+        load_scenario(str(tmp_path / name))

@@ -22,6 +22,12 @@ BROKEN = {  # what replaces a text of a part → what is said
     "include of itself": ("hexa.xml", "parts/world.xml", "hexa.xml"),
     "no XML": ("hexa.xml", "</mujoco>", ""),
     "no number": ("parts/world.xml", 'axis="0 -1 0"', 'axis="0 one 0"'),
+    "not finite": ("parts/world.xml", 'axis="0 -1 0"', 'axis="0 -1 NaN"'),
+    "mass below 0": ("parts/arm_2r.xml", ' mass="', ' mass="-'),
+    "part no XML": ("parts/world.xml", "</mujoco", "</mujo"),
+    "no time step": ("hexa.xml", "<worldbody>", '<option timestep="0"/><worldbody>'),
+    "another model": ("parts/arm_2r.xml", "alpha_1", "beta"),
+    "no arm": ("hexa.xml", '<include file="parts/arm_2r.xml"/>', ""),
 }
 
 

@@ -56,6 +56,16 @@ def test_a_merge_gives_a_key_again(tmp_path):
     assert yaml_file.read(file, ValueError)["c"] == {"x": 3, "y": 2}
 
 
+@pytest.mark.parametrize("number", ["1:30", "010", "-1:30.5", "0_7", "1" + "0" * 400])
+def test_a_number_that_yaml_reads_as_another_one_is_refused(tmp_path, number):
+    file = tmp_path / "made.yaml"
+    file.write_text(f"a:\n  b: [1, {number}]\n")
+    with pytest.raises(ValueError, match="made.yaml line 2 column .* expected"):
+        yaml_file.read(file, ValueError)
+    file.write_text(f"a: '{number}'\nb: [0, 0.5, 00.5, 0x0c, -7, 1_000]\n")
+    assert yaml_file.read(file, ValueError) == {"a": number, "b": [0, 0.5, 0.5, 12, -7, 1000]}
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -17,6 +17,7 @@ import numpy as np
 from uam_control.ages import AHEAD, AHEAD_FOR, BRIDGED
 from uam_control.coordinates import Z
 from uam_control.estimation.history import OLDEST_MATCH, value_at
+from uam_control.estimation.pose_clock import PoseClock
 from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.compiled import jit, prepared
@@ -111,7 +112,7 @@ class PoseFilter:
         self._ahead_since = math.inf  # stamp [s] from which on a pose far ahead waits at any time
         self._clock_ahead = False  # whether the clock of the poses is wrong
         self.ahead: list[tuple[float, np.ndarray, np.ndarray]] = []  # in order of the stamps
-        self._repeats = Repeats()
+        self._clock, self._repeats = PoseClock(), Repeats()
         memory, still = self.memory, np.zeros(3)
         self._predict = prepared(predict_next, memory, 0, 0.0, 0.0, 0.0, still, still)
         self._match = prepared(match_stored, memory, 0, 0.0, still)
@@ -149,10 +150,10 @@ class PoseFilter:
         """Correct with a pose exposed at `stamp` [s].
 
         position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
-        older than the stored predictions, repeats the last pose exactly (`Repeats`), or has jumped
-        away from the estimate (`PoseGate`). One that is newer than the newest prediction waits for
-        the IMU. A stored prediction is compared with one pose: beside a gap of the IMU the same
-        difference would count several times.
+        older than the stored predictions, has a wrong clock (`PoseClock`), repeats the last pose
+        exactly (`Repeats`), or has jumped away from the estimate (`PoseGate`). One that is newer
+        than the newest prediction waits for the IMU. A stored prediction is compared with one pose:
+        beside a gap of the IMU the same difference would count several times.
         """
         newest = (self._count - 1) % HISTORY
         last = self._stamps[newest]
@@ -163,8 +164,10 @@ class PoseFilter:
                 insort(self.ahead, (stamp, position.copy(), quaternion.copy()), key=itemgetter(0))
             return
         compared, gap, jump, bias = self._match(self.memory, newest, stamp, position)
-        if last - stamp > BRIDGED or abs(stamp - compared) > OLDEST_MATCH:
-            self.gate.refused += int(last - stamp > BRIDGED)
+        if not self._clock(stamp, last, BRIDGED):
+            self.gate.refused += 1
+            return
+        if abs(stamp - compared) > OLDEST_MATCH:
             return
         if self._repeats(position, quaternion) or compared == self._compared:
             return

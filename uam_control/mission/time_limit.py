@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from uam_control.mission import MissionParameters, Scenario
 
+STILL_ARMED = 15.0  # s of simulation time for the autopilot's landing after the mission's end
 SETTLED = 5.0  # s of simulation time disarmed, after which a flight without end is over
 DISARMED = "the autopilot has disarmed, and the mission did not end"
 OVERTIME = 60.0  # s of simulation time for start, holds by limits and touchdown
@@ -20,11 +21,20 @@ def time_limit(scenario: Scenario, parameters: MissionParameters | None) -> floa
 
 
 class Settled:
-    """Detects the end of a flight that the mission does not end: in failsafe, or mission lost."""
+    """Detects the end of a flight by the autopilot: disarmed, with or without a mission's end."""
 
     def __init__(self) -> None:
         self._disarmed: float | None = None  # since when [s]; None: armed, or not armed yet
         self._flown = False
+        self._done: float | None = None  # since when [s] the mission is
+
+    def after_mission(self, time: float, armed: bool) -> bool:
+        """Return whether a flight whose mission is done is over: disarmed, or not in time.
+
+        The mission may end earlier than the flight: it knows nothing of a vehicle without a link.
+        """
+        self._done = time if self._done is None else self._done
+        return not armed or time - self._done >= STILL_ARMED
 
     def over(self, time: float, armed: bool) -> bool:
         """Return whether the autopilot was armed and is now disarmed for SETTLED; time [s]."""

@@ -181,7 +181,7 @@ class OffboardSequence:
         self._person = False  # a person has chosen the mode of the released vehicle
         self._begun = -math.inf  # [s] the last tick that began
         self._resumed = -math.inf  # [s] newest end of a gap of the stream
-        self._old = False  # the tick that began last has waited for this process, or another
+        self._late = 0.0  # [s] for which the tick that began last has waited
         self._stop: Request | None = None  # repeated until the vehicle is disarmed
         self._halted = math.inf  # [s] since when
         self._time = 0.0  # [s] of the last update
@@ -242,29 +242,31 @@ class OffboardSequence:
         self.released_to = ""
         self._fail(why)
 
-    def begin(self, time: float, loss_time: float, old: bool = False) -> None:
+    def begin(self, time: float, loss_time: float, late: float = 0.0) -> None:
         """Begin the tick `time` [s], before its setpoint is made.
 
-        loss_time [s]: without setpoints until the autopilot's failsafe begins; old: the tick has
-        waited while a process stood still, see `Waited`.
+        loss_time [s]: without setpoints until the autopilot's failsafe begins; late [s]: for how
+        long the tick has waited while a process stood still, see `Waited`: the autopilot's reports
+        are newer than the tick by so much.
         """
+        now, self._late = time + late, late
         # a little longer: a failsafe that has just begun, or not quite, is seen by its report
-        lost = time - self._streamed > loss_time + SETTLING
+        lost = now - self._streamed > loss_time + SETTLING
         if self.phase is Phase.FLYING and not self.let_go and lost:
-            self._stream_lost = self._resumed = time
+            self._stream_lost = self._resumed = now
             self._release(time, Reported(True, True, Mode.UNKNOWN, Mode.OFFBOARD))
-        elif self.withheld and time - self._begun > loss_time:
-            self._resumed = time
-        self._begun, self._old = time, old
+        elif self.withheld and now - self._begun > loss_time:
+            self._resumed = now
+        self._begun = time
 
     @property
     def withheld(self) -> bool:
-        """Whether the tick is old, or a gap of the stream has just ended and reports may be older.
+        """Whether the tick is late, or a gap of the stream has just ended and reports may be older.
 
         The autopilot returns to OFFBOARD with the first setpoint: the vehicle may stand by now.
         """
         old = self._begun < self._resumed + NEW_REPORTS
-        return self._old or (self.phase is Phase.RELEASED and old)
+        return self._late > 0.0 or (self.phase is Phase.RELEASED and old)
 
     @property
     def after_loss(self) -> bool:
@@ -278,6 +280,7 @@ class OffboardSequence:
     def update(self, time: float, seen: Reported) -> Request | None:
         """Advance to `time` [s] and return the request to send now, None for none."""
         self._time = time
+        gap = time + self._late - min(self._streamed, seen.delivered)
         if (
             self.phase is Phase.FLYING
             and self._desired
@@ -286,10 +289,10 @@ class OffboardSequence:
             and seen.armed
             and seen.mode is Mode.OFFBOARD
             and not seen.killed
-            and time - min(self._streamed, seen.delivered) <= LINK_GAP
+            and gap <= LINK_GAP
         ):
             return None  # most ticks: nothing has changed
-        if self._in_flight and time - min(self._streamed, seen.delivered) > LINK_GAP:
+        if self._in_flight and gap > LINK_GAP:
             self._stream_lost = time
         terminated = seen.mode is Mode.TERMINATION
         if (seen.killed or terminated) and not self.stopped and self._has_motors:

@@ -60,7 +60,8 @@ def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
         return given
     kind = folder.rstrip("s")
     if given.suffix.lower() in SUFFIXES or len(given.parts) > 1:
-        raise ConfigurationError(f"{kind} file {name} does not exist")
+        what = "is no file" if given.exists() else "does not exist"
+        raise ConfigurationError(f"{kind} file {name} {what}")
     for suffix in suffixes:
         found = root() / folder / (name + suffix)
         if found.is_file():

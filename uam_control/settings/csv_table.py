@@ -59,7 +59,8 @@ class CsvTable:
             value = float(field)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        # Python reads 1_0 and digits of all scripts, other programs do not
+        if not (math.isfinite(value) and field.isascii()) or "_" in field:
             raise self.error(line, f"{field!r} is not a finite number", column)
         return value
 

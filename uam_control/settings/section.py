@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings import yaml_file
+from uam_control.settings.visible_text import visible
 
 
 def read_section(file: Path, error: type[ValueError]) -> Section:
@@ -131,4 +132,4 @@ class Section:
         return float(value)
 
     def _name(self, key: str) -> str:
-        return f"{self.where}{' ' if self.where.endswith(':') else '.'}{key}"
+        return f"{self.where}{' ' if self.where.endswith(':') else '.'}{visible(key)}"

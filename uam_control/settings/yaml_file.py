@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
 from uam_control.settings.text_file import text_of
 
 _SafeLoader: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml, if PyYAML has it
+T = TypeVar("T")
+OCTAL = re.compile(r"[-+]?0[0-9_]+$")
 MERGE = "tag:yaml.org,2002:merge"  # of the key <<
 # of constructors: 2024-13-01, !!int x, a list in itself, a text that is no sequence ...
 _REFUSALS = (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
@@ -21,8 +23,32 @@ class _KeyTwice(yaml.constructor.ConstructorError):
     """A key that the same mapping has already."""
 
 
+class _NotPlain(yaml.constructor.ConstructorError):
+    """A number that YAML 1.1 reads as another one than a person does, or that has no float."""
+
+
 class _Strict:
-    """Part of a loader: refuses a key given twice, of which YAML's readers keep the last."""
+    """Part of a loader: refuses a key given twice, of which YAML's readers keep the last, and
+    numbers like 1:30 (90) and 010 (8).
+    """
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """Return a decimal or hexadecimal whole number of 64 bits, as ROS has them."""
+        return self._plain(node, super().construct_yaml_int)
+
+    def construct_yaml_float(self, node: yaml.ScalarNode) -> float:
+        """Return a number that is not written as minutes and seconds."""
+        return self._plain(node, super().construct_yaml_float)
+
+    def _plain(self, node: yaml.ScalarNode, construct: Callable[[yaml.ScalarNode], T]) -> T:
+        if ":" in node.value or OCTAL.match(node.value):
+            text = f"{node.value}: a decimal number expected, or a text in quotes"
+            raise _NotPlain(problem=text, problem_mark=node.start_mark)
+        number = construct(node)
+        if isinstance(number, int) and not -(2**63) <= number < 2**64:
+            text = "a whole number of at most 64 bits expected"
+            raise _NotPlain(problem=text, problem_mark=node.start_mark)
+        return number
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         """Check the keys before those of `<<` are put among them: those may be given again."""
@@ -56,6 +82,9 @@ for _loader in (_Loader, _FastLoader):
         re.compile(r"^[-+]?[0-9][0-9_]*(\.[0-9_]*)?[eE][-+]?[0-9]+$"),
         list("-+0123456789"),
     )
+    for _kind in ("int", "float"):
+        _construct = getattr(_loader, f"construct_yaml_{_kind}")
+        _loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _construct)
 
 
 def parsed(text: str) -> Any:
@@ -74,5 +103,5 @@ def read(file: Path, error: type[ValueError]) -> Any:
     except _REFUSALS as reason:
         mark = getattr(reason, "problem_mark", None)
         where = f" line {mark.line + 1} column {mark.column + 1}" if mark else ""
-        said = reason.problem if isinstance(reason, _KeyTwice) else "not valid YAML"
+        said = reason.problem if isinstance(reason, _KeyTwice | _NotPlain) else "not valid YAML"
         raise error(f"{file}{where}: {said}") from None

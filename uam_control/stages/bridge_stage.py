@@ -137,13 +137,13 @@ class BridgeStage:
         """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
         self.source.note_state(stamp / SECOND, state)
 
-    def hear(self, stamp: int, old: bool = False) -> None:
+    def hear(self, stamp: int, late: float = 0.0) -> None:
         """Take what the autopilot has sent, and the mission's status that counts by now.
 
-        old: whether the tick has waited while a process stood still: it gets no setpoint.
+        late [s]: for how long the tick has waited while a process stood still; it gets no setpoint.
         """
         self.autopilot.poll(stamp / SECOND)
-        self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, old)
+        self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, late)
         while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
             commanded, self.sequence.let_go, regains = self._orders.popleft()
             if regains > self._regains:

@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.ages import BRIDGED, usable
+from uam_control.ages import BRIDGED
+from uam_control.estimation.pose_clock import PoseClock
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
 
@@ -27,6 +28,7 @@ class SupervisorInputs:
         self.inputs = Inputs(control_period)
         self._now = 0  # [ns] of the reading
         self.readings = Readings()
+        self._clock = PoseClock()
         self._kept: dict[str, list[Kept]] = {}
         self._read_at = -READ_PERIOD
 
@@ -44,15 +46,16 @@ class SupervisorInputs:
         """Forget all values: stamps of a new simulation follow."""
         self.inputs.begin_anew()
         self.readings = Readings()
+        self._clock = PoseClock()
         self._kept.clear()
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z].
 
-        One that is not `usable` is none: from the future, its age would never reach a limit; too
-        late, the estimate does not use it.
+        One that does not count for its `PoseClock` is none: from the future, its age would never
+        reach a limit; too late, or of a wrong clock, the estimate does not use it.
         """
-        if usable((self._now - stamp) / SECOND, BRIDGED):
+        if self._clock(stamp / SECOND, self._now / SECOND, BRIDGED):
             self.inputs.mocap(stamp / SECOND, position, quaternion)
 
     def payload(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.ages import FORWARDED, usable
+from uam_control.ages import FORWARDED
+from uam_control.estimation.pose_clock import PoseClock
 from uam_control.estimation.repeats import Repeats
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterSet, number
@@ -36,7 +37,7 @@ class VisionPacing:
         self._parameters = parameters
         self._pose: tuple[float, np.ndarray, np.ndarray] | None = None
         self._sent = -1.0  # [s] exposure of the last pose sent
-        self._repeats = Repeats()
+        self._clock, self._repeats = PoseClock(), Repeats()
 
     def take(
         self, exposed: float, position: np.ndarray, quaternion: np.ndarray, armed: bool
@@ -52,8 +53,8 @@ class VisionPacing:
         return True
 
     def send(self, autopilot: AutopilotPort, now: float) -> None:
-        """Send the newest pose if it is due at `now` [s], and not too old for it."""
-        if self._pose is None or not usable(now - self._pose[0], FORWARDED):
+        """Send the newest pose if it is due at `now` [s], not too old, and of a right clock."""
+        if self._pose is None or not self._clock(self._pose[0], now, FORWARDED):
             return
         p = self._parameters
         exposed, position, quaternion = self._pose

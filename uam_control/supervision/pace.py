@@ -47,13 +47,13 @@ class Waited:
     def __init__(self) -> None:
         self._lag = self._late = self._since = math.inf
 
-    def old(self, stamp: float, wall: float) -> bool:
-        """Return whether the tick `stamp` [s], which begins at `wall` [s], has waited."""
+    def late(self, stamp: float, wall: float) -> float:
+        """Return for how long [s] the tick `stamp` [s], which begins at `wall` [s], has waited."""
         lag = wall - stamp
         if lag - self._lag > STALE:
             if lag < self._late - FALLS:
                 self._late, self._since = lag, wall
             if wall - self._since < STALE:
-                return True
+                return lag - self._lag
         self._lag, self._late = lag, math.inf
-        return False
+        return 0.0

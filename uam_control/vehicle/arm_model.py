@@ -5,6 +5,7 @@ Only the parts that this needs are read: bodies, hinges and geoms with a mass, a
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from uam_control.vehicle.loading import VehicleError
 
 TIP = "magnet"  # body that carries the payload
 FACE = "magnet_face"  # its site, where the payload hangs
+ENDLESS = re.compile(r"(?i)(^|\s)[-+]?(nan|inf|infinity)(\s|$)")
 STRAIGHT = 1e-3  # [m] and [1] by which a planar arm may differ
 
 
@@ -195,7 +197,9 @@ class _Reader:
             for joint in body.findall("joint"):
                 bodies[joint.get("name")] = (body, joint)
         if missing := [name for name in self._names if name not in bodies]:
-            raise VehicleError(f"{self._file}: no joint '{missing[0]}'")
+            attached = any(self._root.iter("attach"))  # a part that is not read here may have it
+            kind = VehicleError if attached else UnreadableModel
+            raise kind(f"{self._file}: no joint '{missing[0]}'")
         links = []
         for name in self._names:
             body, joint = bodies[name]
@@ -226,6 +230,8 @@ class _Reader:
             if "mass" not in attributes:
                 raise VehicleError(f"{self._file}: body '{body.get('name')}': a part without mass")
             mass = float(attributes["mass"])
+            if mass < 0.0:
+                raise ValueError(f"body '{body.get('name')}': mass {mass:g} kg is below 0")
             centre = _vector(attributes.get("pos", "0 0 0"))
             if "fromto" in attributes:
                 centre = _vector(attributes["fromto"]).reshape(2, 3).mean(axis=0)
@@ -243,11 +249,20 @@ class _Reader:
 def _included(file: Path, folder: Path) -> ElementTree.Element:
     """Return the tree of a file; the content of its file, in `folder`, replaces an `include`."""
     root = ElementTree.parse(file).getroot()
+    for one in root.iter():
+        for key, text in one.attrib.items():
+            if key != "name" and ENDLESS.search(text):  # MuJoCo warns of it and goes on
+                raise ValueError(f"{one.tag}: {key}: {text!r} is not finite")
     for parent in list(root.iter()):
         for i, child in reversed(list(enumerate(parent))):
             if child.tag == "include":
                 parent.remove(child)
-                for part in reversed(list(_included(folder / child.get("file"), folder))):
+                name = child.get("file")
+                try:
+                    parts = list(_included(folder / name, folder))
+                except (ElementTree.ParseError, ValueError) as error:
+                    raise ValueError(f"{name}: {error}") from None
+                for part in reversed(parts):
                     parent.insert(i, part)
     return root
 

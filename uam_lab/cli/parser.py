@@ -8,11 +8,13 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from uam_control.settings.visible_text import visible
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.terminal import say
 
 NOT_WRITTEN = 1  # exit status
+LONGEST_ERROR = 2000  # [characters]
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
 # Subcommands and their modules; each module has add(subparsers), which sets `run`: arguments → exit
@@ -100,7 +102,9 @@ def run(options: argparse.Namespace) -> int:
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
             return NOT_WRITTEN
-        say(f"uam {options.command}: {error}", error=True)
+        text = visible(error)  # a name in it may have a line end, a value any length
+        more = f" … ({len(text)} characters)" if len(text) > LONGEST_ERROR else ""
+        say(f"uam {options.command}: {text[:LONGEST_ERROR]}{more}", error=True)
         return WRONG_USE
 
 

@@ -352,7 +352,11 @@ def settings(
         plant=plant,
         scenario_source=str(scenario),
         scenario_options=options,
-        notes=loaded.notes + slower + misfits(flown) + _unsteered(described, loaded, mass),
+        notes=loaded.notes
+        + slower
+        + misfits(flown)
+        + node_options.unread(flown)
+        + _unsteered(described, loaded, mass),
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=presets.added(changes, acting),
         without=left_out,

@@ -58,6 +58,14 @@ def parameters(
     return replace(changed, name=profile.name, file=profile.file), others
 
 
+def unread(profile: Profile) -> tuple[str, ...]:
+    """Return a line about the profile's sections that no node of a flight reads; () without."""
+    known = (*NODES, BRIDGE, *OTHER_NODES)
+    names = ", ".join(sorted(name for name in profile.sections if name not in known))
+    text = f"profile {profile.name}: no node of the flight reads {names}; it has: "
+    return (text + ", ".join(known),) if names else ()
+
+
 def remappings(
     given: Mapping[str, str | Mapping[str, str]], engine: str
 ) -> dict[str, dict[str, str]]:

@@ -140,7 +140,8 @@ class Rehearsal:
             now = lab.plant.time
             if lab.hil.armed and not numbers.armed:
                 numbers.armed, latest = True, now + limit
-            if self._mission.done and math.isinf(end):
+            done = self._mission.done and math.isinf(end)
+            if done and settled.after_mission(now, lab.hil.armed):
                 end = now + self._p.linger
             if now >= end:
                 numbers.ended_by = "mission"

@@ -225,7 +225,7 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
         self.times.lap(DECODE)
-        self._begin_tick(stamp, self._old(stamp))
+        self._begin_tick(stamp, self._late_by(stamp))
         self._adopt()
         if state is BAD or position is BAD or torque is BAD:
             setpoint = self.stage.without(stamp)
@@ -248,18 +248,19 @@ class MavlinkBridgeNode(UamNode):
         self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
         self.done_tick(stamp, begun)
 
-    def _old(self, stamp: int) -> bool:
-        """Return whether the tick `stamp` [ns] has waited while a process stood still."""
-        realtime = self._options.clock == "realtime"
-        return realtime and self._waited.old(stamp / SECOND, time.monotonic())
+    def _late_by(self, stamp: int) -> float:
+        """Return for how long [s] the tick `stamp` [ns] has waited; 0 in lockstep."""
+        if self._options.clock != "realtime":
+            return 0.0
+        return self._waited.late(stamp / SECOND, time.monotonic())
 
-    def _begin_tick(self, stamp: int, old: bool = False) -> None:
+    def _begin_tick(self, stamp: int, late: float = 0.0) -> None:
         """Begin a tick: update delay and faults of the link, receive the autopilot's messages."""
         if self._late:
             self._late.update(stamp / SECOND)
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
-        self.stage.hear(stamp, old)
+        self.stage.hear(stamp, late)
         if self._magnet is not None:
             self._magnet.update(stamp / SECOND)
 
@@ -306,7 +307,7 @@ class MavlinkBridgeNode(UamNode):
         if (state - self._commanded) / SECOND >= self._options.stale_after:
             self._join.skip(state)
             self._last_tick = time.monotonic()
-            setpoint = self._go_without(state, self._old(state))
+            setpoint = self._go_without(state, self._late_by(state))
             self._setpoint.publish(self._writer.fill(state, *sent(setpoint)))
             self.done_tick(state, time.perf_counter())
 
@@ -327,9 +328,9 @@ class MavlinkBridgeNode(UamNode):
             return
         self._go_without(self.stamp + round(silence * SECOND))
 
-    def _go_without(self, stamp: int, old: bool = False) -> Setpoint:
+    def _go_without(self, stamp: int, late: float = 0.0) -> Setpoint:
         """Run a tick at `stamp` [ns] without commands; return the setpoint sent."""
-        self._begin_tick(stamp, old)
+        self._begin_tick(stamp, late)
         setpoint = self.stage.without(stamp)
         self._end_tick(stamp)
         return setpoint

@@ -283,7 +283,8 @@ class Simulator:
                     self.statistics.ended_by = f"time limit of {limit:g} s"
                     break
                 continue
-            if self.answers.mission.done and not self.statistics.ended_by:
+            done = self.answers.mission.done
+            if done and settled.after_mission(self.plant.time, self.hil.armed) and math.isinf(end):
                 self.statistics.ended_by = "mission"
                 end = self.plant.time + self.options.linger
             if self.plant.time >= end:

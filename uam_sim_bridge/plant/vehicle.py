@@ -180,7 +180,8 @@ class Vehicle:
                 f"{described.model}: the bodies weigh {mass:.4g} kg in all, "
                 f"{described.file.name} has mass: {described.mass:g}"
             )
-        steps = described.control_period / model.opt.timestep
+        step = model.opt.timestep
+        steps = described.control_period / step if step > 0.0 else 0.0
         if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
             raise VehicleError(
                 f"{described.model}: timestep {model.opt.timestep:g} s does not divide "

@@ -52,6 +52,8 @@ NOT_USED = {f"{k}_{a}" for k in ("w", "a_rot", "jerk", "snap") for a in AXES}
 NOT_USED |= {f"w{a}" for a in AXES} | {f"u_{i}" for i in range(1, 5)}
 OTHER_UNITS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}  # of t [s]
 PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
+LONG, CRAWL, FAR = 600.0, 0.01, 0.1  # [s, m/s, m] a race of 10 m/s, its times in ms, crawls
+LARGEST = 1e6  # [SI] of a position, rate or angle
 UNIT = 0.02  # largest deviation of a quaternion's norm from 1
 # rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
 FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
@@ -66,6 +68,7 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
     times = table.times - table.times[0]
     notes: list[str] = []
     path = _path(table, times, vehicle, notes)
+    table.check_speed()
     end = RETURN if options.end == AS_SCENARIO else options.end
     scenario = Scenario(
         name=file.stem,
@@ -94,6 +97,9 @@ class _Table:
         backward = np.flatnonzero(np.diff(self.times) <= 0.0)
         if len(backward):
             raise self.error(int(backward[0]) + 1, "t", "time does not increase")
+        for name in self._written.keys() - {"t"}:
+            if (far := np.abs(self._column(name)) > LARGEST).any():
+                raise self.error(int(np.argmax(far)), name, f"beyond {LARGEST:g}")
         check_length(self.times[-1] - self.times[0], f"{file}: column t", LONGEST_FILE)
         low = self.columns("position")[:, Z] <= 0.0
         if low.any():
@@ -103,6 +109,18 @@ class _Table:
     def times(self) -> np.ndarray:
         """Times (m,) [s]."""
         return self._column("t")
+
+    def check_speed(self) -> None:
+        """Raise ScenarioError for a long flight that only crawls: its times are in another unit."""
+        position, length = self.columns("position"), self.times[-1] - self.times[0]
+        steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+        fastest = float((steps / np.diff(self.times)).max())
+        if length > LONG and 0.0 < fastest < CRAWL and float(np.ptp(position, axis=0).max()) > FAR:
+            raise ScenarioError(
+                f"{self.file}: column t: {length:.6g} s, but never faster than {fastest:.2g} m/s, "
+                f"above {CRAWL:g} m/s is possible in a flight of more than {LONG:g} s; give times "
+                "in seconds"
+            )
 
     def columns(self, group: str) -> np.ndarray | None:
         """Return the columns of a group (m, k), None if the file does not have it."""

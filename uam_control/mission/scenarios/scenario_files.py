@@ -33,6 +33,7 @@ from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
 
 T = TypeVar("T")
+SHORTEST = 1e-3  # [s] of a move or of the landing
 
 KEYS = (
     *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "payload"),
@@ -50,13 +51,13 @@ def load_scenario(
     vehicle: that it is for, None for the default one; options: None for the defaults.
     """
     vehicle, options = vehicle or load_description(), options or ScenarioOptions()
-    file = Path(name_or_file)
-    if file.suffix.lower() not in (".yaml", ".csv"):
-        try:
-            file = configuration.named("scenarios", name_or_file)
-        except configuration.ConfigurationError as error:
-            raise ScenarioError(str(error)) from None
-    read = from_csv if file.suffix.lower() == ".csv" else from_yaml
+    try:
+        file = configuration.named("scenarios", name_or_file)
+    except configuration.ConfigurationError as error:
+        raise ScenarioError(str(error)) from None
+    read = FORMS.get(file.suffix.lower())
+    if read is None:
+        raise ScenarioError(f"{file}: a name that ends in {', '.join(FORMS)} expected")
     scenario = read(file, vehicle, options).slowed(options.slowdown)
     check_length(scenario.landing.at + scenario.landing.duration, f"{file}: the flight")
     return scenario
@@ -77,30 +78,33 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
         return _along_route(file, top, arm_start, vehicle, options)
     if "end" in top.values:
         raise top.error("end", "only for a trajectory without moves and landing")
-    phases = _timeline(top, "phases", "from", lambda entry: str(entry.values.get("name", "")))
+    phases = _timeline(top, "phases", "from", "name", Section.text)
     if phases and phases[0][0] > 0.0:
         raise top.error("phases", f"the first begins at {phases[0][0]:g} s, it must begin at 0")
-    payload = top.section("payload") if top.values.get("payload") else None
+    payload = top.section("payload") if top.values.get("payload") is not None else None
+    if payload is not None:
+        payload.only(("mass", "drop_point"))
     faults = top.values.get("faults") or []
     if not isinstance(faults, list):
         raise ScenarioError(f"{file}: 'faults' is not a list")
     entry = top.section("landing")
+    entry.only(("at", "duration"))
     landing = Landing(entry.not_negative("at"), entry.positive("duration"))
+    if landing.duration < SHORTEST:
+        raise entry.error("duration", f"{landing.duration:g} s is below {SHORTEST:g} s")
     scenario = Scenario(
         name=file.stem,
-        description=str(top.values.get("description", "")),
+        description=_description(top),
         arm_start=arm_start,
         phases=phases or ((0.0, "flight"),),
         landing=landing,
         moves=_moves(top, vehicle, landing),
-        magnet=_timeline(top, "magnet", "at", lambda entry: entry.switch("energised")),
+        magnet=_timeline(top, "magnet", "at", "energised", Section.switch),
         payload_mass=payload.not_negative("mass") if payload else 0.0,
         drop_point=(
             payload.numbers("drop_point", 2) if payload and "drop_point" in payload.values else None
         ),
-        snapshots=_timeline(
-            top, "snapshots", "at", lambda entry: str(entry.values.get("caption", ""))
-        ),
+        snapshots=_timeline(top, "snapshots", "at", "caption", Section.text),
         faults=tuple(faults),
     )
     if "trajectory" not in top.values:
@@ -130,7 +134,7 @@ def _along_route(
     route = Route(legs(entry, _middle(start, vehicle)), end, options)
     scenario = Scenario(
         name=file.stem,
-        description=str(top.values.get("description", "")),
+        description=_description(top),
         arm_start=arm_start,
         phases=(),
         landing=Landing(0.0, 0.0),
@@ -205,16 +209,24 @@ def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescriptio
     return angle
 
 
+def _description(top: Section) -> str:
+    return top.text("description") if "description" in top.values else ""
+
+
 def _timeline(
-    top: Section, key: str, time: str, value: Callable[[Section], T]
+    top: Section, key: str, time: str, name: str, value: Callable[[Section, str], T]
 ) -> tuple[tuple[float, T], ...]:
-    """Return the entries of the list `key` as (time [s], value); the times must increase."""
+    """Return the entries of the list `key` as (time [s], value); the times must increase.
+
+    time, name: of the two entries of each; value: reads the second.
+    """
     found: list[tuple[float, T]] = []
     for entry in top.entries(key, True):
+        entry.only((time, name))
         at = entry.not_negative(time)
         if found and at <= found[-1][0]:
             raise entry.error(time, f"{at:g} s is not after the entry before, {found[-1][0]:g} s")
-        found.append((at, value(entry)))
+        found.append((at, value(entry, name)))
     return tuple(found)
 
 
@@ -250,8 +262,12 @@ def _move(entry: Section, vehicle: VehicleDescription) -> Move:
             f"{entry.where}.coordinate: {coordinate!r}, allowed: {', '.join(allowed)}"
         )
     length = coordinate in ("x", "y", "z")
+    entry.only(("coordinate", "from", "until", "to" if length else "to_deg"))
     target = entry.number("to") if length else _angle(entry, "to_deg", coordinate, vehicle)
     start, end = entry.not_negative("from"), entry.number("until")
-    if end <= start:
-        raise ScenarioError(f"{entry.where}: ends at {end} s, before it begins")
+    if end - start < SHORTEST:
+        raise entry.error("until", f"{end:g} s is not {SHORTEST:g} s after from, {start:g} s")
     return Move(coordinate, start, end, target)
+
+
+FORMS = {".yaml": from_yaml, ".yml": from_yaml, ".csv": from_csv}

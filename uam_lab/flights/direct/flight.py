@@ -99,10 +99,13 @@ class DirectFlight:
         )
 
     def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
-        """Fly until the mission is done; progress(mission time [s], phase) once a second."""
+        """Fly until mission and vehicle are at their end.
+
+        progress(mission time [s], phase): called once a second.
+        """
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
-        while not output.done:
+        while not (output.done and settled.after_mission(plant.time, self.armed)):
             second = plant.tick // ticks_a_second
             left = int((self._limit - plant.time) / plant.period)
             try:
