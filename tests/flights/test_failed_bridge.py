@@ -7,9 +7,9 @@ import pytest
 from wired_flight import wired_flight
 
 from uam_control.coordinates import CHI, CHI_DOT, Z
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import Phase
 from uam_control.supervision import State
-from uam_sim_bridge.mavlink.offboard.sequence import Phase
-from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 REBOOTED = "the autopilot rebooted in flight"
 
