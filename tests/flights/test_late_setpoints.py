@@ -17,7 +17,7 @@ landing: {{at: 11, duration: 3}}
 """
 
 
-def flown(folder, way, delay, seed, begin="start", reserve=0.03):
+def flown(folder, way, delay, seed, begin="start", reserve=0.0):
     file = folder / "zigzag.yaml"
     file.write_text(ZIGZAG.format(way=way / 2, back=-way / 2))
     flight = Flight(
@@ -34,7 +34,7 @@ def flown(folder, way, delay, seed, begin="start", reserve=0.03):
 
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_fast_zigzag_does_not_take_off_with_late_setpoints(tmp_path, seed):
-    found = flown(tmp_path, 5.2, 0.028, seed, reserve=0.0)
+    found = flown(tmp_path, 5.2, 0.028, seed)
     assert "that the reference stands" in found["abort_reason"]
     assert found["max"]["position_m"][2] is None  # nothing of a flight
 
@@ -42,7 +42,7 @@ def test_a_fast_zigzag_does_not_take_off_with_late_setpoints(tmp_path, seed):
 def test_a_zigzag_that_stands_no_delay_that_may_begin_in_flight_is_refused(tmp_path):
     """With 40 ms from its middle on it turned over: the delay is known after seconds."""
     with pytest.raises(ScenarioError, match="change of the body rate 26.1 rad/s.2 exceeds 19.5"):
-        flown(tmp_path, 5.2, 0.04, 1, begin=5.5)
+        flown(tmp_path, 5.2, 0.04, 1, begin=5.5, reserve=0.03)
 
 
 def test_a_gentler_one_is_flown_with_them(tmp_path):

@@ -28,9 +28,9 @@ from uam_sim_bridge.plant import Vehicle
 PROFILE = load_profile("s500")
 OPEN = replace(
     PROFILE.sets["mission"], reference_thrust=36.0, reference_tilt=1.2, tilt_hold=1.25,
-    tilt_failsafe=1.4, reference_yaw_rate=5.0, reference_delay=0.0,
+    tilt_failsafe=1.4, reference_yaw_rate=5.0,
 )  # fmt: skip
-IN_TIME = replace(PROFILE.sets["mission"], reference_delay=0.0)
+IN_TIME = PROFILE.sets["mission"]
 TIMES = np.arange(0.0, 3.0, 0.01)
 
 

@@ -89,7 +89,7 @@ class FeasibilityLimits(ParameterSet):
         1e4,
     )
     reference_delay: float = number(
-        0.03,
+        0.0,
         "delay of the setpoints with which references are checked: that much may begin in flight",
         "s",
         0.0,
