@@ -186,9 +186,19 @@ def test_a_browser_without_webgl_has_the_commands(flight):
     with from_playwright.sync_playwright() as playwright:
         without = ["--no-sandbox", "--disable-gpu", "--disable-webgl", "--disable-3d-apis"]
         browser = playwright.chromium.launch(executable_path=BROWSER, args=without)
-        page = browser.new_page(viewport={"width": 390, "height": 844})
+        page = browser.new_page()
         page.set_default_timeout(PATIENCE)
         page.goto(flight.address)
         page.get_by_role("button", name="Hold").click()
         expect(page.locator("#uam-plain")).to_contain_text("HOLDING", timeout=PATIENCE)
+        expect(page.get_by_text("no WebGL")).to_be_visible()
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
         browser.close()
+
+
+def test_a_phone_has_the_commands(flight, page):
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto(flight.address)
+    expect(page.get_by_text("This window is narrow")).to_be_visible()
+    expect(page.get_by_role("button", name="Land")).to_be_enabled()

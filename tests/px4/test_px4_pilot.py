@@ -83,7 +83,8 @@ def test_a_landing_by_pilot_or_battery_is_not_overridden(tmp_path, mode, phase):
     assert found.requests == [] and found.back == np.inf
     # PX4 shows OFFBOARD again once it has disarmed
     assert [one for one in pilot.since_acted if one is not Mode.OFFBOARD] == [Mode.LAND]
-    assert not result.completed and "has control" in result.reason
+    who = "the pilot or a ground station" if mode else "the autopilot's failsafe"
+    assert not result.completed and f"{who}, in LAND, has control" in result.reason
     if phase != PICK:  # there it lands on the payload's stand: docs/supervision.md
         assert found.tilt < UPRIGHT
 

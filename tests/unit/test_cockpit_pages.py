@@ -152,6 +152,15 @@ def test_pages_are_guarded_and_strangers_are_refused(served):
         connect(f"ws://127.0.0.1:{port}", origin="http://evil", subprotocols=["viser-v0"])
 
 
+def test_a_narrow_window_gets_the_plain_page_which_links_the_scene(served):
+    server, *_ = served
+    scene, plain = (get(server, path)[1] for path in ("/", "/control"))
+    assert re.search(r"screen.width\) < 700", scene)
+    assert 'location.replace("/control?without=width")' in scene
+    (anyway,) = re.findall(r'<a href="/([^"]+)">The page with the scene', plain)
+    assert f'location.search !== "{anyway}"' in scene  # the link is not turned back
+
+
 def test_only_the_page_commands(served):
     server, todo, services, said = served
     _, page, _ = get(server, "/control")

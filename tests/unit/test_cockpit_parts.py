@@ -352,6 +352,22 @@ def test_frames_without_end_do_not_fill_the_page():
     assert scene.frames["/world/f0"].position[0] == 3.0
 
 
+def test_loops_orphans_and_a_moved_world_leave_the_vehicle_in_the_scene():
+    scene, level = Scene(), np.array([1.0, 0.0, 0.0, 0.0])
+    view = VehicleView(scene)
+    hostile = [("a", "b"), ("b", "a"), ("c", "c"), ("", ""), ("a", WORLD), (WORLD, WORLD)]
+    hostile += [(f"nowhere{i}", f"orphan{i}") for i in range(2 * MOST_FRAMES)]
+    view.transforms([Transform(0, p, c, np.zeros(3), level) for p, c in hostile])
+    deep = [
+        (WORLD, "base_link"),
+        *((f"d{i}" if i else "base_link", f"d{i + 1}") for i in range(50)),
+    ]
+    for x in (1.0, math.nan, math.inf, 2.0):
+        view.transforms([Transform(0, p, c, np.array([x, 0, 0]), level) for p, c in deep])
+    assert scene.frames["/world/base_link"].position[0] == 2.0
+    assert len(scene.frames) == 51
+
+
 def test_a_marker_with_a_number_that_is_not_finite_is_refused():
     marker = Marker(ns="payload", type=Marker.CUBE)
     marker.header.frame_id, marker.color.r = WORLD, math.inf

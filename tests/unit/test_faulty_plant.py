@@ -170,6 +170,13 @@ def test_an_imu_is_biased(unit, felt):
             np.testing.assert_allclose(force - getattr(usual, kind)[2], [0, 2.0 * size, 0])
 
 
+def test_the_bias_of_an_imu_rises():
+    rows = during(faulty("imu_bias", "gyro=0,accelerometer=2,over=0.1"))
+    for number, ((_, ours, _), (_, usual, _)) in enumerate(zip(rows, during(NOMINAL), strict=True)):
+        rise = [2.0 * min(1.0, number * 0.004 / 0.1), 0.0, 0.0]
+        np.testing.assert_allclose(ours.imu[2] - usual.imu[2], rise, atol=1e-9)
+
+
 def test_an_imu_saturates():
     for _, samples, _ in during(faulty("imu_saturation", "gyro=0.002,accelerometer=3")):
         for _, gyro, force in (samples.imu, samples.hil):

@@ -30,6 +30,7 @@ OPEN = replace(
     PROFILE.sets["mission"], reference_thrust=36.0, reference_tilt=1.2, tilt_hold=1.25,
     tilt_failsafe=1.4, reference_yaw_rate=5.0,
 )  # fmt: skip
+IN_TIME = PROFILE.sets["mission"]
 TIMES = np.arange(0.0, 3.0, 0.01)
 
 
@@ -159,23 +160,22 @@ def zigzag(folder, period):
     [(1.6, -0.01), (2.0, 0.0125), (2.3, 0.028), (2.5, 0.04)],
 )
 def test_the_faster_a_zigzag_the_less_delay_it_stands(tmp_path, period, delay):
-    limits = PROFILE.sets["mission"]
-    excesses, stands = Feasibility(PROFILE.vehicle, limits, 0.0).examined(zigzag(tmp_path, period))
+    excesses, stands = Feasibility(PROFILE.vehicle, IN_TIME, 0.0).examined(zigzag(tmp_path, period))
     assert stands == pytest.approx(delay, abs=0.004)
     assert ("change of the body rate" in in_words(excesses)) is (delay < 0.0)
-    limits = replace(limits, reference_delay=stands + 0.001)
+    limits = replace(IN_TIME, reference_delay=stands + 0.001)
     with pytest.raises(InfeasibleReference, match="change of the body rate"):
         Feasibility(PROFILE.vehicle, limits, 0.0).check(zigzag(tmp_path, period))
 
 
 def test_a_delay_that_the_reference_does_not_stand_is_in_the_pre_arm_report(tmp_path):
-    mission = Mission(zigzag(tmp_path, 2.0), PROFILE.sets["mission"], vehicle=PROFILE.vehicle)
+    mission = Mission(zigzag(tmp_path, 2.0), IN_TIME, vehicle=PROFILE.vehicle)
     state = np.zeros((3, 8))
     state[0, 2], state[0, 6:] = 0.285, mission.scenario.arm_start
     fresh = {"mocap_age": 0.0, "joint_age": 0.0, "controller_age": 0.0, "autopilot_age": 0.0}
     mission.step(0.0, state, None, Readings(**fresh, round_trip=0.004))
     assert mission.start() == (True, "arming")
-    mission = Mission(zigzag(tmp_path, 2.0), PROFILE.sets["mission"], vehicle=PROFILE.vehicle)
+    mission = Mission(zigzag(tmp_path, 2.0), IN_TIME, vehicle=PROFILE.vehicle)
     mission.step(0.0, state, None, Readings(**fresh, round_trip=0.028))
     accepted, why = mission.start()
     assert not accepted and "delay for the reference: 0.028 s (at most 0.01" in why

@@ -9,6 +9,7 @@ from uam_control.profiles.profile_fit import misfits
 from uam_control.vehicle import load_description
 from uam_lab.flights import flight_settings
 from uam_lab.flights.flight_settings import settings
+from uam_lab.flights.node_options import unread
 
 S500 = load_description()
 
@@ -57,3 +58,11 @@ def test_a_flight_with_payload_says_that_the_arms_lengths_are_unknown(monkeypatc
     assert settings("quick_pick", engine="direct").notes == (note,)
     assert not settings("hover", engine="direct").notes
     assert not settings("quick_pick", engine="direct", payload_mass=0.0).notes
+
+
+def test_a_section_that_no_node_reads_is_named():
+    profile = default_profile("modular", load_description())
+    assert not unread(profile)
+    typed = profile_of({**profile.sections, "misssion": {"geofence_land": 1.0}}, profile.file)
+    (text,) = unread(typed)
+    assert "no node of the flight reads misssion; it has: position_controller" in text

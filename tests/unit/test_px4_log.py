@@ -16,7 +16,7 @@ FIELDS = {
     "vehicle_rates_setpoint": ("roll", "pitch", "yaw", ("thrust_body", 3)),
     "vehicle_attitude": (("q", 4),),
     "vehicle_angular_velocity": (("xyz", 3),),
-    "vehicle_local_position": ("x", "y", "z"),
+    "vehicle_local_position": ("x", "y", "z", "xy_valid", "z_valid"),
     "actuator_motors": (("control", 12),),
 }
 
@@ -28,6 +28,7 @@ def message(kind: bytes, content: bytes) -> bytes:
 def ulog(topics: dict[str, list[tuple[float, ...]]]) -> bytes:
     """A ULog of rows (time [s], values): header, flags, formats, subscriptions, data."""
     out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40))
+    out += message(b"P", struct.pack("<B17sf", 17, b"float THR_MDL_FAC", 0.5))
     for name in topics:
         fields = [(f, 1) if isinstance(f, str) else f for f in FIELDS[name]]
         texts = [f"float{f'[{n}]' if n > 1 else ''} {field};" for field, n in fields]
@@ -53,6 +54,7 @@ def flown() -> Table:
     table["setpoint.thrust"] = np.where((time > 0.0) & (time < 9.0), 0.5, 0.0)
     table["setpoint.rate_x"] = 0.4 * np.sin(3.0 * time) * np.exp(-((time - 4.0) ** 2))
     table["setpoint.rate_y"] = 0.2 * np.cos(5.0 * time) * np.exp(-((time - 6.0) ** 2))
+    table |= {f"estimate.{axis}": np.full_like(time, 2.0) for axis in "xyz"}
     return table
 
 
@@ -77,7 +79,10 @@ def test_the_clocks_are_aligned_by_the_setpoints_and_the_frames_are_ours(tmp_pat
                 "vehicle_rates_setpoint": setpoints(table),
                 "vehicle_attitude": [(3.2, np.cos(half), 0.0, 0.0, np.sin(half))],
                 "vehicle_angular_velocity": [(4.2, 1.0, 2.0, 3.0)],
-                "vehicle_local_position": [(5.2, 1.0, 2.0, -3.0)],
+                "vehicle_local_position": [
+                    (4.2, -5e6, 7.0, 9.0, 0, 0),  # before it is valid
+                    (5.2, 1.5, 2.25, 403.0, 1, 1),
+                ],
                 "actuator_motors": [(5.2, *motors)],
             }
         )
@@ -94,11 +99,14 @@ def test_the_clocks_are_aligned_by_the_setpoints_and_the_frames_are_ours(tmp_pat
     yaw, pitch, roll = (at(f"estimate.{axis}") for axis in ("yaw", "pitch", "roll"))
     assert np.degrees([yaw, pitch, roll]) == pytest.approx([30.0, 0.0, 0.0], abs=1e-4)
     assert [at(f"estimate.{axis}_dot") for axis in ("roll", "pitch", "yaw")] == [1.0, -2.0, -3.0]
-    assert [at(f"estimate.{axis}") for axis in "xyz"] == [2.0, 1.0, 3.0]
+    # z: its origin is 405 m away, in a station's altitude
+    assert [at(f"estimate.{axis}") for axis in "xyz"] == [2.25, 1.5, 2.0]
+    assert log.origins == {"estimate.z": 405.0}
     assert [name for name in log.columns if name.startswith("rotor")] == [
         f"rotor_{i}.command" for i in (1, 2, 3, 4)
     ]
-    assert at("rotor_3.command") == pytest.approx(0.3)
+    # 0.5 u^2 + 0.5 u = 0.3
+    assert at("rotor_3.command") == pytest.approx(np.sqrt(0.85) - 0.5, abs=1e-6)
 
 
 @pytest.mark.parametrize("ahead", [-7.0, 0.0, 250.0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from operator import attrgetter
 
 import numpy as np
 
@@ -28,10 +28,13 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
+from uam_control.mission.demand import Demand, Excess
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.motion.trajectory import Trajectory, reference_rows
+from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
-from uam_control.mission.scenarios.scenario import Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_control.vehicle.arm_model import ArmModel
@@ -51,69 +54,12 @@ ACROSS = ("x", "y", "yaw")
 TURN = 2  # steps to both sides, over which a change of the body rates counts: the rate loop's lag
 PRECISION = 1e-3  # of the slowdown, relative
 ROOM = 1.002  # by which the slowdown is larger than the least one found
+USED = 0.8  # of thrust, tilt and rates by a run-up that is long enough
+CLEAR = 0.2  # [m] of a ramp from the geofence and the ground
 
 
 class InfeasibleReference(ScenarioError):
     """A reference that exceeds a limit; the text is one line: what, which limit, when."""
-
-
-class Excess(NamedTuple):
-    """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins.
-
-    origin: of a limit that is in no parameter, in words; ramp: the run-up or run-out it is in.
-    """
-
-    quantity: str
-    value: float
-    limit: float
-    unit: str
-    time: float
-    first: float
-    origin: str = ""
-    ramp: str = ""
-
-    @property
-    def text(self) -> str:
-        """The excess in words."""
-        beyond = "exceeds" if self.value > self.limit else "is below"
-        limit = f"{self.limit:.3g} {self.unit}" + (f", {self.origin}," if self.origin else "")
-        ramp = f"{self.ramp}: " if self.ramp else ""
-        return (
-            f"{ramp}{self.quantity} {self.value:.3g} {self.unit} {beyond} {limit} "
-            f"at {self.time:.1f} s (from {self.first:.1f} s on)"
-        )
-
-
-def _beyond(excess: Excess) -> float:
-    return abs(excess.value - excess.limit)
-
-
-class Demand(NamedTuple):
-    """What a reference needs at times (m,) [s] of mission time.
-
-    position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; turn (m,) [rad/s^2]: change of those of roll and pitch; yaw_rate (m,) [rad/s];
-    angles (m, n) [rad]; joint_rates (m, n) [rad/s];
-    joint_torques (m, n) [N m] and magnet_force (m,) [N], the payload's apparent weight, NaN if the
-    arm's masses are unknown.
-    """
-
-    times: np.ndarray
-    position: np.ndarray
-    speed: np.ndarray
-    thrust: np.ndarray
-    tilt: np.ndarray
-    body_rates: np.ndarray
-    turn: np.ndarray
-    yaw_rate: np.ndarray
-    angles: np.ndarray
-    joint_rates: np.ndarray
-    joint_torques: np.ndarray
-    magnet_force: np.ndarray
-
-    def within(self, part: slice | np.ndarray) -> Demand:
-        """Return that of a part of the times."""
-        return Demand(*(values[part] for values in self))
 
 
 class _Planned:
@@ -149,8 +95,8 @@ class Feasibility:
         A flight of many hours is computed in parts, so that its memory is bounded.
         """
         flight, turn = _Planned(scenario), 0.0
-        found: dict[tuple[str, float], Excess] = {}
-        legs: dict[str, dict[tuple[str, float], Excess]] = {RUN_UP: {}, TRAJECTORY: {}, RUN_OUT: {}}
+        found: dict[tuple, Excess] = {}
+        legs: dict[str, dict[tuple, Excess]] = {RUN_UP: {}, TRAJECTORY: {}, RUN_OUT: {}}
         for begin in range(0, len(flight.times), PART):
             part = slice(max(begin - BESIDE, 0), begin + PART + BESIDE)
             demand = self._planned(flight, part)
@@ -164,8 +110,8 @@ class Feasibility:
                     self._collect(demand.within(phases == leg), flight.ground, excesses)
         for leg in (RUN_UP, RUN_OUT):  # where the ramp is the reason, it is named
             for key in legs[leg].keys() - legs[TRAJECTORY].keys():
-                named = legs[leg][key]._replace(ramp=leg)
-                found[key] = max(named, found[key], key=_beyond) if found[key].ramp else named
+                found.pop(key, None)
+                found[*key, leg] = legs[leg][key]._replace(ramp=leg)
         return sorted(found.values(), key=lambda excess: excess.first), self.limits.delay_of(turn)
 
     def _collect(self, demand: Demand, ground: float, found: dict) -> bool:
@@ -174,7 +120,7 @@ class Feasibility:
         for one in exceeded:
             key = one.quantity, one.limit
             known = found.get(key, one)
-            worst = max(known, one, key=_beyond)
+            worst = max(known, one, key=attrgetter("beyond"))
             found[key] = worst._replace(first=known.first)
         return bool(exceeded)
 
@@ -202,31 +148,10 @@ class Feasibility:
 
         ground [m]: height of the origin at the take-off, None for that of the demand's begin.
         """
-        p, servo = self.limits, self.vehicle.servo
+        p = self.limits
         ground = demand.position[0, Z] if ground is None else ground
-        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
-        high[Z] = min(high[Z], ground + p.altitude_hold)
-        rates = np.abs(demand.body_rates[:, : YAW - ROLL]).max(axis=1)
-        upper = [
-            (THRUST, demand.thrust, self.thrust_limit, "N"),
-            ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
-            ("body rate", rates, min(p.reference_body_rate, p.body_rate_hold), "rad/s"),
-            ("change of the body rate", demand.turn, p.largest_turn, "rad/s^2"),
-            ("yaw rate", np.abs(demand.yaw_rate), p.reference_yaw_rate, "rad/s"),
-        ]
-        for i in range(demand.angles.shape[1]):
-            angle, rate, torque = (
-                np.abs(values[:, i])
-                for values in (demand.angles, demand.joint_rates, demand.joint_torques)
-            )
-            upper += [
-                (f"joint {i + 1} angle", angle, p.joint_angle_hold[i], "rad"),
-                (f"joint {i + 1} rate", rate, servo.no_load_speed, "rad/s"),
-                (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
-            ]
-        holding = self.vehicle.numbers["magnet"]["holding_force"]
-        upper.append(("force on the magnet", demand.magnet_force, holding, "N"))
-        place = demand.position.T
+        low, high = self._room(ground)
+        place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
         height, sinking = self._near_ground(demand, ground)
@@ -243,6 +168,40 @@ class Feasibility:
                     excess = Excess(quantity, float(values[worst]), float(limit), unit, *at, origin)
                     found.append(excess)
         return sorted(found, key=lambda excess: excess.first)
+
+    def _room(self, ground: float) -> np.ndarray:
+        """Return the corners (2, 3) [m] of the space above a take-off at height `ground` [m]."""
+        low, high = np.array(self.limits.geofence_low), np.array(self.limits.geofence_high)
+        high[Z] = min(high[Z], ground + self.limits.altitude_hold)
+        return np.stack([low, high])
+
+    def _motion(self, demand: Demand) -> list[tuple[str, np.ndarray, float, str]]:
+        """Return quantity, values (m,), limit and unit of the base's motion."""
+        p = self.limits
+        rates = np.abs(demand.body_rates[:, : YAW - ROLL]).max(axis=1)
+        return [
+            (THRUST, demand.thrust, self.thrust_limit, "N"),
+            ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
+            ("body rate", rates, min(p.reference_body_rate, p.body_rate_hold), "rad/s"),
+            ("change of the body rate", demand.turn, p.largest_turn, "rad/s^2"),
+            ("yaw rate", np.abs(demand.yaw_rate), p.reference_yaw_rate, "rad/s"),
+        ]
+
+    def _arm(self, demand: Demand) -> list[tuple[str, np.ndarray, float, str]]:
+        """Return the same of arm and magnet."""
+        p, found = self.limits, []
+        for i in range(demand.angles.shape[1]):
+            angle, rate, torque = (
+                np.abs(values[:, i])
+                for values in (demand.angles, demand.joint_rates, demand.joint_torques)
+            )
+            found += [
+                (f"joint {i + 1} angle", angle, p.joint_angle_hold[i], "rad"),
+                (f"joint {i + 1} rate", rate, self.vehicle.servo.no_load_speed, "rad/s"),
+                (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
+            ]
+        holding = self.vehicle.numbers["magnet"]["holding_force"]
+        return [*found, ("force on the magnet", demand.magnet_force, holding, "N")]
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
         """Return heights (m,) [m] of a vehicle that moves across, and sink rates (m,) [m/s] of one
@@ -272,33 +231,67 @@ class Feasibility:
         if found := self.excesses(scenario):
             raise InfeasibleReference(f"scenario {scenario.name}: {in_words(found)}")
 
+    def fitted(self, scenario: Scenario) -> Scenario:
+        """Return the scenario with other ramps in place of those that exceed a limit, if there are
+        some that do not."""
+        route = scenario.route
+        if route is None or not route.ramps_chosen:
+            return scenario
+        phases = {excess.ramp for excess in self.excesses(scenario)}
+        return scenario.along(route.with_ramps(phases, self._ramp)) if any(phases) else scenario
+
+    def _ramp(self, goal: np.ndarray) -> Polynomials | None:
+        """Return the shortest run-up to goal (5, 6 + n) that leaves a reserve, else the one that
+        needs least, None if each exceeds a limit."""
+        room = self._room(STANDING)
+        room[0, Z] = max(room[0, Z], STANDING + self.limits.touchdown_height)
+        room += np.array([[CLEAR], [-CLEAR]])
+        begin = goal[CHI, POSITION]
+        best, least = None, math.inf
+        for ramp in within_room(goal, np.minimum(room[0], begin), np.maximum(room[1], begin)):
+            times = np.arange(0.0, ramp.length, STEP)
+            demand = self.along(ramp, times, np.zeros(len(times)))
+            used = max((values / limit).max() for _, values, limit, _ in self._motion(demand))
+            if used < least and not self.exceeded(demand, STANDING):
+                best, least = ramp, used
+                if used <= USED:
+                    break
+        return best
+
     def retimed(self, scenario: Scenario) -> tuple[Scenario, float]:
         """Return the scenario slowed down until it is feasible, and the factor, 1 if it is already.
 
+        Ramps that are not part of the trajectory are fitted first, and at each slowdown.
         Raises InfeasibleReference if no slowdown up to SLOWEST makes it feasible.
         """
+        scenario = self.fitted(scenario)
         found = self.excesses(scenario)
         if not found:
             return scenario, 1.0
+        chosen = scenario.route is not None and scenario.route.ramps_chosen
         low, high = 1.0, 1.1
         while found:
             places = [
-                excess for excess in found if excess.unit == "m" or "angle" in excess.quantity
+                excess
+                for excess in found
+                if (excess.unit == "m" and not (chosen and excess.ramp))
+                or "angle" in excess.quantity
             ]
             if places or low >= SLOWEST:
                 text = f"{in_words(places or found)}, and a slowdown does not help"
                 raise InfeasibleReference(f"scenario {scenario.name}: {text}")
-            found = self.excesses(scenario.slowed(high))
+            slower = self.fitted(scenario.slowed(high))
+            found = self.excesses(slower)
             if found:
                 low, high = high, min(high * high, SLOWEST)
         while high / low > 1.0 + PRECISION:
             middle = math.sqrt(low * high)
-            if self.excesses(scenario.slowed(middle)):
+            if self.excesses(self.fitted(scenario.slowed(middle))):
                 low = middle
             else:
                 high = middle
         factor = min(high * ROOM, SLOWEST)
-        return scenario.slowed(factor), factor
+        return self.fitted(scenario.slowed(factor)), factor
 
     def demand(self, scenario: Scenario) -> Demand:
         """Return what a flight from the origin needs, from the take-off to the landing."""

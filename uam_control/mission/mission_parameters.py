@@ -89,7 +89,11 @@ class FeasibilityLimits(ParameterSet):
         1e4,
     )
     reference_delay: float = number(
-        0.0, "delay of the setpoints with which references are checked", "s", 0.0, 1.0
+        0.0,
+        "delay of the setpoints with which references are checked: that much may begin in flight",
+        "s",
+        0.0,
+        1.0,
     )
     rate_lag: float = number(
         0.04, "lag of the body rates behind their setpoint, of the autopilot's rate loop; a delay "

@@ -153,12 +153,12 @@ class MissionNode(UamNode):
         return reference_limits(*bases, bridge)
 
     def _scenario(self, vehicle: VehicleDescription) -> Scenario:
-        """Return the scenario; with the parameter `retime` slowed down until it is feasible."""
+        """Return the scenario, its ramps within the limits if they can be; with the parameter
+        `retime` slowed down until it is feasible."""
         scenario = described_scenario(self, vehicle)
+        check = Feasibility(vehicle, self.parameter_set.current, scenario.payload_mass)
         if not self.get_parameter("retime").value:
-            return scenario
-        limits = self.parameter_set.current
-        check = Feasibility(vehicle, limits, scenario.payload_mass)
+            return check.fitted(scenario)
         try:
             scenario, factor = check.retimed(scenario)
         except InfeasibleReference as error:

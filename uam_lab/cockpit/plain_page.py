@@ -1,4 +1,4 @@
-"""The plain page: state and commands without the scene, for a browser without WebGL.
+"""The plain page: state and commands without the scene, for a phone or without WebGL.
 
 The websocket server answers GET only. A command is therefore a GET with a header, which a page of
 another origin cannot send, and with the secret of this page.
@@ -14,6 +14,8 @@ from uam_lab.cockpit.commands import BUTTONS, GOAL, Commands, Later
 from uam_lab.records.results import templates
 
 ADDRESS, STATE, COMMAND, GOTO = "/control", "/state", "/command", "/goto"
+NARROWEST = 700  # [px] of a window that shows the scene between the panels
+ANYWAY = "?scene"  # of the address: the scene in a narrower one, too
 HEADER = "X-Uam-Command"  # of a command; its value is the secret
 HTML, JSON = "text/html; charset=utf-8", "application/json"
 NAMES = {button.label: button for button in BUTTONS}
@@ -81,4 +83,6 @@ class PlainPage:
             goal=GOAL,
             results=self._results,
             control=ADDRESS,
+            narrowest=NARROWEST,
+            anyway=ANYWAY,
         )

@@ -56,7 +56,12 @@ class VehicleView:
             own = replace(
                 transform, parent=self._own(transform.parent), child=self._own(transform.child)
             )
-            if own.child in self._orphans or len(self._orphans) < MOST_FRAMES:
+            if own.child == WORLD:  # all others are placed in it
+                continue
+            if own.parent in self._paths:
+                self._orphans.pop(own.child, None)
+                self._place(own.child, own)
+            elif own.child in self._orphans or len(self._orphans) < MOST_FRAMES:
                 self._orphans[own.child] = own
         placed = True
         while placed:

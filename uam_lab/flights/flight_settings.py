@@ -327,6 +327,7 @@ def settings(
             f"retimed: {factor:.4g} times as slow" if factor > 1.0 else "retimed: as written",
         )
     else:
+        loaded = feasible.fitted(loaded)
         feasible.check(loaded)
     arm_on_ground.check(described, loaded, plant)
     injected = read_schedule(faults, loaded, seed)

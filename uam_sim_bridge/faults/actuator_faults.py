@@ -82,7 +82,7 @@ class BatterySag(PhysicsFault):
     over: float = number(2.0, "time in which the thrust falls", "s", 0.0, 1000.0)
 
     def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
-        physics.rotor_parts *= 1.0 + _done(now, self.over) * (self.remaining - 1.0)
+        physics.rotor_parts *= 1.0 + now.done(self.over) * (self.remaining - 1.0)
 
 
 class WindGust(PhysicsFault):
@@ -98,12 +98,7 @@ class WindGust(PhysicsFault):
     def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
         angle = math.radians(self.towards)
         full = np.array([self.speed * math.cos(angle), self.speed * math.sin(angle), self.up])
-        physics.wind += 0.5 * (1.0 - math.cos(math.pi * _done(now, self.rise))) * full
-
-
-def _done(now: Occurrence, over: float) -> float:
-    """Return the part 0..1 of a transition of `over` [s] that is done."""
-    return 1.0 if now.since >= over else now.since / over
+        physics.wind += 0.5 * (1.0 - math.cos(math.pi * now.done(self.rise))) * full
 
 
 FAULTS = (

@@ -58,6 +58,10 @@ class Occurrence:
     since: float = 0.0
     memory: Any = None
 
+    def done(self, over: float) -> float:
+        """Return the part 0..1 of a transition of `over` [s] that is done."""
+        return 1.0 if self.since >= over else self.since / over
+
 
 class PlantFault(Fault):
     """A fault of sensors, actuators, payload or wind. PHYSICS: it needs `Plant.disturb`.

@@ -20,26 +20,27 @@ class ImuFault(PlantFault):
 
     unit: str = choice(BOTH, UNIT, UNITS)
 
-    def altered(self, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
+    def altered(self, now: Occurrence, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
         """Return the sample as the fault changes it: gyro (3,) and specific force (3,), FLU."""
         raise NotImplementedError
 
     def sense(self, samples: Samples, now: Occurrence) -> None:
         if self.unit != AUTOPILOT and samples.imu is not None:
-            samples.imu = self.altered(*samples.imu)
+            samples.imu = self.altered(now, *samples.imu)
         if self.unit != COMPANION:
-            samples.hil = self.altered(*samples.hil)
+            samples.hil = self.altered(now, *samples.hil)
 
 
 class ImuBias(ImuFault):
-    """Gyroscope and accelerometer have a constant bias on one axis."""
+    """Gyroscope and accelerometer have a bias on one axis, constant or rising at first."""
 
     gyro: float = number(0.05, "bias of the gyroscope", "rad/s", -5.0, 5.0)
     accelerometer: float = number(0.5, "bias of the accelerometer", "m/s^2", -50.0, 50.0)
     axis: str = choice("x", "biased axis, FLU", AXES)
+    over: float = number(0.0, "time in which the bias rises from zero", "s", 0.0, 1000.0)
 
-    def altered(self, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
-        along = np.eye(3)[AXES.index(self.axis)]
+    def altered(self, now: Occurrence, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
+        along = now.done(self.over) * np.eye(3)[AXES.index(self.axis)]
         return stamp, gyro + self.gyro * along, force + self.accelerometer * along
 
 
@@ -49,7 +50,7 @@ class ImuSaturation(ImuFault):
     gyro: float = number(0.2, "largest body rate", "rad/s", 0.0, 50.0)
     accelerometer: float = number(10.0, "largest specific force", "m/s^2", 0.0, 200.0)
 
-    def altered(self, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
+    def altered(self, now: Occurrence, stamp: float, gyro: np.ndarray, force: np.ndarray) -> Imu:
         limited = np.clip(force, -self.accelerometer, self.accelerometer)
         return stamp, np.clip(gyro, -self.gyro, self.gyro), limited
 

@@ -72,15 +72,24 @@ class Polynomials:
 
 def joined(parts: list[Polynomials]) -> Polynomials:
     """Return the parts one after the other, each from the end of the one before on."""
-    degree = max(part.coefficients.shape[1] for part in parts)
-    knots, coefficients = [np.zeros(1)], []
+    knots = [np.zeros(1)]
     for part in parts:
         knots.append(knots[-1][-1] + part.knots[1:] - part.knots[0])
-        count, own, size = part.coefficients.shape
-        coefficients.append(
-            np.concatenate([part.coefficients, np.zeros((count, degree - own, size))], axis=1)
-        )
-    return Polynomials(np.concatenate(knots), np.concatenate(coefficients))
+    return Polynomials(np.concatenate(knots), np.concatenate(_of_one_degree(*parts)))
+
+
+def added(one: Polynomials, other: Polynomials) -> Polynomials:
+    """Return the sum of two curves with the same knots."""
+    return Polynomials(one.knots, np.add(*_of_one_degree(one, other)))
+
+
+def _of_one_degree(*parts: Polynomials) -> list[np.ndarray]:
+    """Return the coefficients, those of lower degrees with zeros."""
+    degree = max(part.coefficients.shape[1] for part in parts)
+    return [
+        np.pad(part.coefficients, ((0, 0), (0, degree - part.coefficients.shape[1]), (0, 0)))
+        for part in parts
+    ]
 
 
 def hermite(knots: np.ndarray, rows: np.ndarray) -> Polynomials:

@@ -23,7 +23,7 @@ from uam_control.coordinates import YAW, Z, arm_coordinates
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 from uam_control.mission.scenarios.open_gaps import worst_swing
-from uam_control.mission.scenarios.route import Route, with_ramps
+from uam_control.mission.scenarios.route import Route
 from uam_control.mission.scenarios.scenario import (
     LONGEST_FILE,
     Landing,
@@ -76,7 +76,7 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
         arm_start=vehicle.stowed,
         phases=(),
         landing=Landing(0.0, 0.0),
-        route=Route(with_ramps(path, options), end, options),
+        route=Route.around(path, end, options),
         notes=tuple(notes),
     )
     return scenario.begun_at(standing(vehicle.stowed))

@@ -79,16 +79,21 @@ class Scenario:
             return self
         return routed(self, self.route.flight(start))
 
+    def along(self, route: Route) -> Scenario:
+        """Return the flight along another route."""
+        return replace(self, route=route).begun_at(standing(self.arm_start))
+
     def slowed(self, factor: float) -> Scenario:
         """Return the scenario that takes `factor` times as long.
 
-        Of a flight along a route alone, take-off, transit, return and landing keep their lengths.
+        Of a flight along a route alone, take-off, transit, return and landing keep their lengths,
+        and ramps that are not part of the trajectory are chosen anew.
         """
         if factor == 1.0:
             return self
         route = self.route and self.route.slowed(factor)
         if route is not None and self.route_at is None:
-            return replace(self, route=route).begun_at(standing(self.arm_start))
+            return self.along(route)
 
         def later(pairs: tuple) -> tuple:
             return tuple((factor * time, value) for time, value in pairs)

@@ -43,6 +43,7 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
+STANDS = 0.01  # [1] motor command
 ESTIMATE = "estimate"
 STATE_ROWS = ("positions", "velocities", "accelerations")
 
@@ -143,8 +144,12 @@ def read_flight(
     truth = log.samples(states, STATE_ROWS, columns.size)
     first, last = references.samples.stamps[[0, -1]]
     # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
-    # the mission's end depend on the time until the plant receives the end, so they are cut off.
-    last = min(last, end + 1) if end is not None else _last_of_all(last, truth.stamps)
+    # the mission's end depend on the time until the plant receives the end, so they are cut off,
+    # unless the motors turn: then the table ends when they stand.
+    if end is not None:
+        last = min(last, max(end, _still(log, end, columns.rotors) if simulated else end) + 1)
+    else:
+        last = _last_of_all(last, truth.stamps)
     every = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
     if not len(every):
         raise UnreadableLog(f"{path} has no control tick")
@@ -201,6 +206,13 @@ def withheld(log: Log, ticks: np.ndarray, states: np.ndarray, references: np.nda
     setpoints, _ = log.published(topics.SETPOINT)
     inner = np.isin(ticks, states) | np.isin(ticks, references)
     return np.isin(ticks, setpoints) & ~inner
+
+
+def _still(log: Log, end: int, rotors: int) -> int:
+    """Return the stamp [ns] of the last command that turns a motor from `end` on, 0 without one."""
+    commands = log.samples(topics.TRUTH_ROTORS, ("position",), rotors)
+    turning = commands.stamps[(commands.stamps >= end) & (commands.rows > STANDS).any(axis=1)]
+    return int(turning[-1]) if len(turning) else 0
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:

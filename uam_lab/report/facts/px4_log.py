@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import correlate, correlation_lags
 from scipy.spatial.transform import Rotation
 
+from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_lab.records.results.timeseries import Series, UnreadableFlight
 
 STEP = 0.004  # [s] of the grid on which the logs are aligned
 MISSING = "PX4's log is not shown: pip install pyulog"
 ALIGNED = {"setpoint.thrust": 1.0, "setpoint.rate_x": 0.3, "setpoint.rate_y": 0.3}  # weights
+OTHER_ORIGIN = 1.0  # [m] a larger mean distance is that of two origins
 Data = Mapping[str, np.ndarray]
 
 
@@ -31,12 +33,14 @@ class UnreadableUlog(UnreadableFlight):
 class Px4Log:
     """Columns by our names: (time [s], values), and how well the clocks agree.
 
-    offset: mission time minus PX4's [s]; correlation of the setpoints there, 0..1.
+    offset: mission time minus PX4's [s]; correlation of the setpoints there, 0..1. origins: ours
+    minus PX4's [m], by column, where they differ: a station moves PX4's. The values are from ours.
     """
 
     columns: Mapping[str, tuple[np.ndarray, np.ndarray]]
     offset: float
     correlation: float
+    origins: Mapping[str, float] = field(default_factory=dict)
 
 
 def read(file: Path, series: Series) -> Px4Log:
@@ -48,19 +52,29 @@ def read(file: Path, series: Series) -> Px4Log:
     from pyulog.exceptions import ULogException
 
     try:
-        found = ULog(str(file), list(TOPICS)).data_list
+        log = ULog(str(file), list(TOPICS))
     except (ULogException, TypeError, ValueError, LookupError, struct.error) as error:
         raise UnreadableUlog(f"{file} is no readable ULog: {error}") from None
-    columns = {}
-    for data in found:
+    columns, factor = {}, float(log.initial_parameters.get("THR_MDL_FAC", 0.0))
+    for data in log.data_list:
         if data.multi_id == 0 and len(data.data["timestamp"]):
             time = 1e-6 * data.data["timestamp"]
-            columns |= {name: (time, values) for name, values in TOPICS[data.name](data.data)}
+            for name, values in TOPICS[data.name](data.data):
+                if name.startswith("rotor"):  # logged before PX4's thrust curve, ours is after it
+                    values = np.array([inverse_curve(factor, thrust) for thrust in values])
+                if (known := np.isfinite(values)).any():
+                    columns[name] = time[known], values[known]
     if not ALIGNED.keys() & columns.keys():
         raise UnreadableUlog(f"{file} has no vehicle_rates_setpoint, by which the logs are aligned")
     offset, correlation = align(series, columns)
     moved = {name: (time + offset, values) for name, (time, values) in columns.items()}
-    return Px4Log(moved, offset, correlation)
+    origins = {}
+    for name in moved.keys() & {"estimate.x", "estimate.y", "estimate.z"}:
+        time, values = moved[name]
+        shift = float(np.median(np.interp(time, series.time, series[name]) - values))
+        if abs(shift) > OTHER_ORIGIN:
+            origins[name], moved[name] = shift, (time, values + shift)
+    return Px4Log(moved, offset, correlation, origins)
 
 
 def align(
@@ -122,13 +136,17 @@ def _rate_setpoint(data: Data) -> list[tuple[str, np.ndarray]]:
 
 
 def _position(data: Data) -> list[tuple[str, np.ndarray]]:
-    ours = (("x", data["y"]), ("y", data["x"]), ("z", -data["z"]))
-    return [(f"estimate.{name}", values) for name, values in ours]
+    ours = (("x", data["y"], "xy"), ("y", data["x"], "xy"), ("z", -data["z"], "z"))
+    return [
+        (f"estimate.{name}", np.where(data[f"{valid}_valid"] != 0, values, np.nan))
+        for name, values, valid in ours
+    ]
 
 
 def _motors(data: Data) -> list[tuple[str, np.ndarray]]:
     numbers = (i for i in range(12) if np.isfinite(data[f"control[{i}]"]).any())
-    return [(f"rotor_{i + 1}.command", data[f"control[{i}]"]) for i in numbers]
+    # NaN: the motor stands
+    return [(f"rotor_{i + 1}.command", np.nan_to_num(data[f"control[{i}]"])) for i in numbers]
 
 
 # topic of PX4 → its columns under our names

@@ -40,6 +40,9 @@ def px4_log(flights: Sequence[DrawnFlight]) -> Figure | None:
             *panels.thin(series.time, factor * series[name]), color=style.FLIGHTS[0], linewidth=0.8
         )
         axis.set_ylabel(label)
+        if name in log.origins:
+            text = f"PX4 {log.origins[name]:+.1f} m: its origin"
+            axis.set_title(text, fontsize=7, loc="left", pad=2, color=style.FLIGHTS[1])
     for axis in axes.flat[len(shown) :]:
         axis.set_visible(False)
     keys = [style.key("ours", style.FLIGHTS[0]), style.key("PX4", style.FLIGHTS[1], 1.4)]
