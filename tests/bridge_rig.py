@@ -6,6 +6,7 @@ import numpy as np
 from free_port import free_port
 from geometry_msgs.msg import TwistStamped
 from quadrotor import MASS, Quadrotor
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool
 
 from uam_control.frames import swap_body
@@ -13,7 +14,7 @@ from uam_control.maths.rotations import euler_from_quaternion
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
 from uam_msgs_py.messages.convert import PoseWriter
-from uam_msgs_py.messages.serialized import Serialized
+from uam_msgs_py.messages.ros_time import nanoseconds
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -26,9 +27,10 @@ WEIGHT = MASS * 9.81
 
 
 def read_setpoint(data: bytes) -> tuple[int, np.ndarray, float]:
-    """The acknowledged setpoint: stamp [ns], body rates (3,) [rad/s, FLU], thrust 0..1."""
-    message = Serialized(TwistStamped, data)
-    return message.stamp, message.vector("angular"), float(message.vector("linear")[2])
+    """The acknowledged setpoint: stamp [ns], body rates (3,) [rad/s, FLU] or NaN, thrust 0..1."""
+    message = deserialize_message(data, TwistStamped)
+    stamp, rates = message.header.stamp, message.twist.angular
+    return nanoseconds(stamp), np.array([rates.x, rates.y, rates.z]), message.twist.linear.z
 
 
 class Rig:

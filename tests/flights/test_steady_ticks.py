@@ -36,15 +36,20 @@ def flight(scenario="hover", law="modular", vehicle="s500_arm", payload=0.2, see
     return DirectFlight(load_scenario(scenario, described), profile, flown, payload, seed, **more)
 
 
+def over(one):
+    """Whether mission and vehicle are at their end."""
+    return one.mission.output.done and not one.armed
+
+
 def fly_objects(one, until):
     """Fly to tick `until` by the objects alone."""
-    while one.plant.tick < until and not one.mission.output.done:
+    while one.plant.tick < until and not over(one):
         one.tick()
 
 
 def fly_steady(one, until):
     """Fly to tick `until`, steady where it may be."""
-    while one.plant.tick < until and not one.mission.output.done:
+    while one.plant.tick < until and not over(one):
         one.advance(until - one.plant.tick, until - one.plant.tick)
 
 

@@ -23,9 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import STALE
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_euler
 from uam_control.setpoints.attitude_target import STILL
+from uam_control.setpoints.kinds.attitude import attitude_setpoint
 from uam_control.setpoints.kinds.desired import Desired, SetpointType, Target, level
 from uam_control.setpoints.kinds.rates import rates_setpoint
 from uam_control.setpoints.level_hold import UNKNOWN, HoldParameters, LevelHold
@@ -109,6 +111,10 @@ class SetpointSource:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
         self._estimated, self._motion, self._height = stamp, state, state.item(CHI, Z)
 
+    def estimate(self, now: float) -> np.ndarray | None:
+        """Return the newest estimate (3, 6 + n), None if it is STALE at `now` [s]."""
+        return self._motion if now - self._estimated < STALE else None
+
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
         self._seen = stamp, quaternion
@@ -176,7 +182,10 @@ class SetpointSource:
         desired = self._hold.setpoint(now, self._attitude(now), velocity, longest)
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
-        return None if desired is None else self._type(desired)
+        if desired is None:
+            return None
+        # in a failsafe the setpoints may be late: the autopilot levels the vehicle by itself
+        return (attitude_setpoint if let_go else self._type)(desired)
 
     def _present(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] while somebody else has control.

@@ -237,7 +237,8 @@ class BridgeStage:
         if self.hands and not self._situation.armed:
             setpoint = self.source.without(now, self._situation)
         autopilot.tick(now)
-        self._vision.send(autopilot, now)
+        estimate = self.source.estimate(now) if self._situation.armed else None
+        self._vision.send(autopilot, now, estimate)
         if setpoint is not None and self.sequence.streaming and not self._dry_run:
             autopilot.send_setpoint(setpoint, now)
             self.sequence.streamed(now)

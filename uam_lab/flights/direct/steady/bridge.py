@@ -21,6 +21,7 @@ from uam_control.setpoints.setpoint_source import Situation
 from uam_control.stages.autopilot_report import AutopilotReport
 from uam_control.stages.bridge_stage import LIFT_PERIOD, LONGEST_STEP, BridgeStage
 from uam_control.stages.flight_measurements import MeasurementArrays, measure
+from uam_control.stages.vision_pacing import BEYOND, beyond
 from uam_control.stamps import SECOND
 from uam_lab.flights.direct.steady.estimation import keep_pose, same
 from uam_lab.flights.direct.steady.inputs import LIFT, InputArrays
@@ -244,7 +245,7 @@ def send(
         m.hold_thrust += dt / _THRUST_TIME * (thrust - m.hold_thrust)
     else:
         m.hold_thrust = thrust
-    send_vision(a, now, time)
+    send_vision(a, now, time, state)
     a.setpoint[0], a.setpoint[1], a.setpoint[2] = rates[0], -rates[1], -rates[2]
     a.setpoint[3] = min(1.0, max(0.0, thrust))
     if time - m.stream_last > STREAM_GAP:
@@ -267,13 +268,17 @@ def send(
 
 
 @jit
-def send_vision(a: BridgeArrays, now: float, time: float) -> None:
-    """Give the newest pose to the autopilot's estimator if it is due at `now` [s]."""
+def send_vision(a: BridgeArrays, now: float, time: float, state: np.ndarray) -> None:
+    """Give the newest pose to the autopilot's estimator if it is due at `now` [s]; see
+    `VisionPacing.send`."""
     m = a.memory[0]
     due = m.exposed - m.vision_sent >= m.vision_interval - 1e-9
     if not m.pose_waits or not usable(now - m.exposed, FORWARDED) or not due:
         return
-    m.pose_waits, m.vision_sent = 0, m.exposed
+    m.pose_waits = 0
+    if beyond(a.pose[:3], state, now - m.exposed) > BEYOND:
+        return
+    m.vision_sent = m.exposed
     if not autopilots(a.pose, a.given):
         return
     age = age_by(m.exposed, time)
