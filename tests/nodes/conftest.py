@@ -150,7 +150,7 @@ def start(forks, tmp_path) -> Iterator[Callable[..., Running]]:
 
     def launch(module: str, *arguments: object, publishers: str = "any") -> Running:
         """publishers: the node's parameter; by default the probe may publish every topic."""
-        if ".nodes." in module and publishers:
+        if (".nodes." in module or module.startswith("uam_lab.")) and publishers:
             arguments = (*arguments, "--ros-args", "-p", f"publishers:={publishers}")
         log = tmp_path / f"node_{len(running)}.log"
         node = Running(forks.start(module, [str(one) for one in arguments], log), log)

@@ -32,6 +32,6 @@ def tagged(tmp_path, monkeypatch):
 def test_bad_arguments_are_refused_in_one_line(start, tagged, module, arguments, complaint):
     node = start(module, "--ros-args", *arguments)
     assert node.process.wait(20) == 2, node.output
-    name = module.rpartition(".")[2]
+    name = module.rpartition(".")[2].removesuffix("_node")
     (line,) = [line for line in node.output.splitlines() if line.startswith(f"{name}: ")]
     assert complaint in line and "Traceback" not in node.output
