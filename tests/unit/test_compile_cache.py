@@ -145,6 +145,17 @@ def test_a_process_killed_while_it_wrote_leaves_nothing_that_is_loaded(tmp_path,
     assert start().call("result", "float64") == (15.0, 0)
 
 
+@pytest.mark.parametrize("content", [b"no pickle", b"cmoved.away\nArguments\n."])
+def test_a_file_that_cannot_be_read_is_compiled_again(tmp_path, content, start):
+    """As a file of a version in which a class of the arguments was in another module."""
+    write(tmp_path)
+    start().call("result", "float64")
+    for file in tmp_path.glob("__pycache__/caller.*.nbc"):
+        file.write_bytes(content)
+    assert start().call("result", "float64") == (15.0, 0)
+    assert start().call("result", "float64") == (15.0, 1)
+
+
 def test_a_function_with_two_inner_functions_has_the_code_of_each(tmp_path, start):
     """As the steady ticks of the direct engine, with the step of a law."""
     (tmp_path / "closure.py").write_text(CLOSURE.format(double=2))

@@ -10,6 +10,7 @@ constants that are compiled into it. Here the file name contains a digest of all
 from __future__ import annotations
 
 import hashlib
+import pickle
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -33,6 +34,8 @@ def _mangled(record: types.Record) -> tuple[str, tuple[str, ...]]:
 
 
 types.Record.mangling_args = property(_mangled)
+
+UNUSABLE = (OSError, EOFError, ImportError, AttributeError, ValueError, pickle.UnpicklingError)
 
 
 class CompileCache(FunctionCache):
@@ -78,10 +81,14 @@ class _Files(IndexDataCacheFile):
         return any(Path(self._cache_path).glob(pattern))
 
     def load(self, key: Any) -> Any:
-        """Return the data saved for `key`; None if no readable file exists."""
+        """Return the data saved for `key`; None if no usable file exists.
+
+        The file contains pickled types of the arguments. It is of no use if it is damaged, or if
+        a class of them has moved to another module since.
+        """
         try:
             return self._load_data(self._name(key))
-        except OSError:
+        except UNUSABLE:
             return None
 
     def save(self, key: Any, data: Any) -> None:
