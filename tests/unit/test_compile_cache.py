@@ -91,6 +91,29 @@ def result(name):
 """
 
 
+# the function is in another file than the class of its argument
+FIELDS = """
+from typing import NamedTuple
+import numpy as np
+from uam_control.maths.compiled import jit
+from reader import read
+
+class Pair(NamedTuple):
+    {fields[0]}: float
+    {fields[1]}: float
+
+def result():
+    return read(Pair(1.0, 2.0)), sum(read.stats.cache_hits.values())
+"""
+READER = """
+from uam_control.maths.compiled import jit
+
+@jit
+def read(pair):
+    return pair.first
+"""
+
+
 def write(folder: Path, factor: int = 2, offset: int = 10) -> None:
     (folder / "caller.py").write_text(CALLER)
     (folder / "callee.py").write_text(CALLEE.format(factor=factor, offset=offset))
@@ -145,7 +168,7 @@ def test_a_process_killed_while_it_wrote_leaves_nothing_that_is_loaded(tmp_path,
     assert start().call("result", "float64") == (15.0, 0)
 
 
-@pytest.mark.parametrize("content", [b"no pickle", b"cmoved.away\nArguments\n."])
+@pytest.mark.parametrize("content", [b"", b"no pickle", b"cmoved.away\nArguments\n."])
 def test_a_file_that_cannot_be_read_is_compiled_again(tmp_path, content, start):
     """As a file of a version in which a class of the arguments was in another module."""
     write(tmp_path)
@@ -175,6 +198,18 @@ def test_records_of_two_layouts_compiled_apart_are_distinguished(tmp_path, start
         assert [process.call("of_axes", axes) for axes in order] == [
             {2: 30.0, 3: 60.0}[axes] for axes in order
         ]
+
+
+def test_a_named_tuple_is_known_by_its_fields_and_its_module(tmp_path, start):
+    """numba's key has neither: with older code the fields are exchanged, or nothing loads."""
+    (tmp_path / "reader.py").write_text(READER)
+    (tmp_path / "old.py").write_text(FIELDS.format(fields=("first", "second")))
+    assert start("old").call("result") == (1.0, 0)
+    assert start("old").call("result") == (1.0, 1)
+    (tmp_path / "old.py").write_text(FIELDS.format(fields=("second", "first")))
+    assert start("old").call("result") == (2.0, 0)
+    (tmp_path / "old.py").rename(tmp_path / "new.py")
+    assert start("new").call("result") == (2.0, 0)
 
 
 def test_what_is_compiled_is_known_until_an_edit(tmp_path, start):

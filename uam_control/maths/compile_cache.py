@@ -71,7 +71,8 @@ class _Files(IndexDataCacheFile):
         _content(Path(function.__code__.co_filename))
 
     def _name(self, key: Any) -> str:
-        signature = hashlib.sha256(repr((numba.__version__, key)).encode()).hexdigest()
+        named = [list(_named(kind)) for kind in key[0]]
+        signature = hashlib.sha256(repr((numba.__version__, key, named)).encode()).hexdigest()
         return f"{self._base}.{_sources(self._function)}.{signature[:16]}.nbc"
 
     @property
@@ -102,8 +103,11 @@ class _Files(IndexDataCacheFile):
 
 
 def _sources(function: Callable) -> str:
-    """Return a digest of the source files and constants that are compiled into `function`."""
-    files, constants = set(), set()
+    """Return a digest of the source files and constants that are compiled into `function`.
+
+    This file is one of them: it decides how code is named.
+    """
+    files, constants = {Path(__file__)}, set()
     for part in _parts(function, set()):
         if isinstance(part, Path):
             files.add(part)
@@ -152,8 +156,18 @@ def _given(function: Callable) -> Iterator[tuple[str, Callable | None]]:
     for name, cell in zip(function.__code__.co_freevars, cells, strict=True):
         value = cell.cell_contents
         if isinstance(value, types.Type):
-            yield f"{name}={value}", None
+            yield f"{name}={value}{list(_named(value))}", None
         else:
             inner = value.py_func
             deeper = [one for one, _ in _given(inner)]
             yield f"{name}={inner.__module__}.{inner.__qualname__}{deeper}", inner
+
+
+def _named(kind: types.Type) -> Iterator[str]:
+    """Yield module and fields of each named tuple in a type; numba's text has the name alone."""
+    if isinstance(kind, types.TypeRef):
+        kind = kind.instance_type
+    if isinstance(kind, (types.NamedTuple, types.NamedUniTuple)):
+        yield f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}{kind.fields}"
+    for inner in kind.types if isinstance(kind, types.BaseTuple) else ():
+        yield from _named(inner)
