@@ -47,7 +47,11 @@ def test_diagnostics_name_missing_inputs(start, probe):
     ("name", "arguments", "complaint"),
     [
         ("position_controller", ["-p", "varpi:=-1.0"], "varpi: -1.0 is outside"),
-        ("position_controller", ["-p", "lamda_1:=[1.0, 1.0, 1.0]"], "lamda_1: unknown; allowed:"),
+        (
+            "position_controller",
+            ["-p", "lamda_1:=[1.0, 1.0, 1.0]"],
+            "did you mean lambda_1?",
+        ),
         ("arm_controller", ["-p", "inertia:=[1.0, 1.0, 1.0]"], "a list of 2 numbers expected"),
         ("attitude_controller", ["-p", "inertia:=[1.0, .nan, 1.0]"], "inertia:"),
         ("arm_controller", ["-p", "law:=pid"], "law: 'pid' is not one of modular, asmc1, asmc2"),

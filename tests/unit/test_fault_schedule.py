@@ -155,7 +155,7 @@ REFUSED = {
     "mocap_dropout@pick+nan": "after: nan is not a time",
     "mocap_dropout@inf": "at: inf is not a time",
     "mocap_dropout@20:": "NAME@SECONDS[+DURATION], NAME@PHASE",
-    "mocap_dropout@20:speed=3": "speed: unknown parameter; there are: none",
+    "mocap_dropout@20:speed=3": "speed: unknown; allowed: nothing",
     "motor_loss@20:motor=2.5": "motor: 2.5 is not a whole number",
     "motor_loss@20:motor=13": "motor: 13.0 is outside 1 to 12",
     "motor_loss@20:motor": "'motor' is not one parameter=value",

@@ -130,7 +130,7 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"room__z": [0.0]}, "room.z: a list of 2 numbers expected"),
         ({"room__h": 2.0}, "room.h: unknown; allowed: x, y, z"),
         ({"room__z": [-0.1, 0.8]}, "scenario hover: z 1 m exceeds 0.8 m"),
-        ({"mocap__bodi": "uam"}, "mocap: bodi: unknown; allowed: source, system,"),
+        ({"mocap__bodi": "uam"}, "mocap: bodi: unknown, did you mean body"),
         ({"mocap__calibration": "none.yaml"}, "mocap: mocap file none.yaml does not exist"),
         ({"mocap__command_port": 0}, "mocap: command_port: 0 is outside 1 to 65535"),
         ({"arm__serial": "/dev/x"}, "arm.serial: unknown; allowed: device, baud_rate"),

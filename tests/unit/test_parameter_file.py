@@ -109,3 +109,20 @@ def test_a_partial_file_alone_is_refused_with_what_it_needs(tmp_path, text):
     with pytest.raises(ProfileError, match=complaint) as refused:
         load_profile(str(file))
     assert str(refused.value).endswith("as --profile s500 --profile mine.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("misson: {ros__parameters: {tilt_hold: 0.7}}", "section misson: .* did you mean mission"),
+        ("mission: {ros__parameters: {tilt_hld: 0.7}}", "tilt_hld: .* did you mean tilt_hold"),
+        ("mission: {ros__parameters: {}, tilt_hold: 0.7}", "tilt_hold: not within 'ros__param"),
+    ],
+)
+def test_what_no_node_would_read_is_refused(tmp_path, text, complaint):
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    with pytest.raises(ProfileError, match=f"mine.yaml: .*{complaint}"):
+        load_profile("s500", str(file))
+    file.write_text("my_mission: {ros__parameters: {tilt_hld: 0.7}}")  # a node of the user's own
+    assert load_profile("s500", str(file)).sets == load_profile("s500").sets

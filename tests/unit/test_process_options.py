@@ -113,7 +113,7 @@ def test_trying_out_changes_nothing_here():
     ("options", "refusal"),
     [
         ({"process": {"cores": "1023"}}, "cores: 1023; this process may use"),
-        ({"process": {"priority": 5}}, "priority: unknown; allowed: fifo_priority"),
+        ({"process": {"priority": 5}}, "priority: unknown, did you mean fifo_priority"),
         ({"process": {"nice": 3}, "engine": "direct"}, "the direct engine has no nodes"),
         ({"tick_times": True, "engine": "direct"}, "the direct engine has no nodes"),
     ],

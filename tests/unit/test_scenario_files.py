@@ -140,7 +140,11 @@ payload: {mass: 0.1}
     ("old", "new", "reason"),
     [
         ("duration: 5", "duration: 5, drop: 1", "landing.drop: unknown; allowed: at, duration"),
-        ("to: 1", "to: 1, form: 2", r"moves\[0\].form: unknown; allowed: coordinate, from"),
+        (
+            "to: 1",
+            "to: 1, form: 2",
+            r"moves\[0\].form: unknown, did you mean from. allowed: ",
+        ),
         ("mass: 0.1", "mass: 0.1, droppoint: [0, 1]", "payload.droppoint: unknown"),
         ("payload: {mass: 0.1}", "payload: 0", "payload: a mapping expected, got 0"),
         (", name: up", "", r"phases\[0\].name is missing"),
@@ -148,7 +152,7 @@ payload: {mass: 0.1}
         ("description: up", "description: [1]", "description: a name expected"),
         ("duration: 5", "duration: 1e-300", "landing.duration: 1e-300 s is below 0.001 s"),
         ("until: 4", "until: 1e-9", r"moves\[0\].until: 1e-09 s is not 0.001 s after from, 0 s"),
-        ("payload:", '"pay\\nload\\e":', "pay␊load␛: not an entry"),
+        ("payload:", '"pay\\nload\\e":', "pay␊load␛: unknown, did you mean payload. allowed: "),
     ],
 )
 def test_an_entry_that_nothing_reads_is_refused(tmp_path, old, new, reason):

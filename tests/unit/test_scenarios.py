@@ -179,7 +179,7 @@ def test_every_scenario_of_the_library_is_smooth(name):
     ("text", "reason"),
     [
         ("trajectory: {kind: square}", "trajectory.kind: 'square', allowed: circle, ellipse"),
-        ("trajectory: {kind: circle, radius: 1, size: [1, 1]}", "size: not an entry of circle"),
+        ("trajectory: {kind: circle, radius: 1, size: [1, 1]}", "size: unknown"),
         ("trajectory: {kind: circle, radius: 1, height: 1}", "period: exactly one of period"),
         ("trajectory: {kind: circle, radius: 0, height: 1}", "radius: 0 is not above 0"),
         ("trajectory: {kind: circle, radius: 1, height: 1, period: 4, speed: 2}", "exactly one"),
@@ -231,7 +231,7 @@ def test_every_scenario_of_the_library_is_smooth(name):
         ),
         (f"trajectory: {CIRCLE}\nend: hover", "end: 'hover', allowed: return, land"),
         (f"trajectory: {CIRCLE}\nmagnet: []", "magnet: not together with a trajectory alone"),
-        (f"trajectory: {CIRCLE}\nspeed: 3", "speed: not an entry of a scenario"),
+        (f"trajectory: {CIRCLE}\nspeed: 3", "speed: unknown"),
         (f"{MOVES}trajectory: {CIRCLE}", "trajectory.at is missing"),
         (
             f"{MOVES}trajectory: {CIRCLE[:-1]}, at: 10}}",

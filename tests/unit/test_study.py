@@ -198,7 +198,7 @@ def test_sentences_count_what_adaptation_carries_and_where_it_wins(study):
         ({"conditions": {"a": None}}, "conditions.a: a mapping expected"),
         ({"nominal": {"vehicle": 3}}, "nominal.vehicle: a mapping expected"),
         ({"ranges": {"modular": [1]}}, "ranges.modular: a mapping expected"),
-        ({"extra": 1}, "extra: missing, or no entry of a study"),
+        ({"extra": 1}, "extra: unknown; allowed: vehicle"),
     ],
 )
 def test_a_wrong_study_is_refused_in_one_line(study, tmp_path, change, text):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
 from uam_control.settings import configuration
+from uam_control.settings.names import unknown
 from uam_control.settings.parameter_file import EVERY_NODE, ProfileError, read_sections
 from uam_control.settings.parameter_set import MissingParameter, ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
@@ -45,6 +47,8 @@ CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
+READ = (*NODES, BRIDGE)  # nodes of a profile; a file may have sections of others
+LIKE = 0.85  # likeness of a name that means one of them
 # shares that a reference may need: of the bridge's largest body rates; of the acceleration that the
 # attitude law's largest torque gives
 FOLLOWED, TURNED = 0.9, 0.75
@@ -159,9 +163,17 @@ def load_profile(
         for node, values in _shared(file, found, sections, vehicle):
             sections[node] = sections.get(node, {}) | values
         for node, values in found.items():
+            if _misspelt(node):
+                raise ProfileError(f"{file}: section {node}: {unknown(node, READ)}")
             sections[node] = sections.get(node, {}) | values
     found = profile_of(sections, files[-1], vehicle)
     return replace(found, name="+".join(file.stem for file in files))
+
+
+def _misspelt(node: str) -> bool:
+    """Return whether a section's name means a node of a profile: misson, but not my_mission."""
+    own = any(f"_{one}_" in f"_{node}_" for one in READ)
+    return not own and bool(get_close_matches(node, READ, 1, LIKE))
 
 
 def _shared(

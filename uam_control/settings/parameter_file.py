@@ -64,6 +64,8 @@ def _sections(
         name = f"{path}/{str(key).strip('/')}"
         values = body.get("ros__parameters") if isinstance(body, dict) else None
         if isinstance(values, dict):
+            if beside := [str(one) for one in body if one != "ros__parameters"]:
+                raise ProfileError(f"{file}: '{key}': {beside[0]}: not within 'ros__parameters'")
             yield name, values
         elif values is None and body and all(isinstance(one, dict) for one in _inner(body)):
             yield from _sections(file, body, name)

@@ -12,6 +12,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from uam_control.settings.names import unknown
+
 TINY = 1e-9
 HUGE = 1e6
 ANY_LENGTH = -1  # of a vector
@@ -135,7 +137,7 @@ class ParameterSet:
         known = cls.specs()
         for name in values:
             if name not in known:
-                raise ParameterError(f"{name}: unknown; allowed: {', '.join(known)}")
+                raise ParameterError(f"{name}: {unknown(name, known)}")
         return cls(**values).validated(axes)
 
     def to_mapping(self) -> dict[str, Any]:

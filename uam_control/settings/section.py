@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings import yaml_file
+from uam_control.settings.names import unknown
 from uam_control.settings.visible_text import visible
 
 
@@ -24,6 +25,8 @@ class Section:
 
     def __init__(self, values: dict[str, Any], where: str, error: type[ValueError]) -> None:
         self.values, self.where, self._error = values, where, error
+        self._asked: dict[str, None] = {}
+        self._inner: dict[str, Section] = {}
 
     def error(self, key: str, text: str) -> ValueError:
         """Return the error that the entry `key` is wrong; text: what is wrong, what is allowed."""
@@ -31,22 +34,39 @@ class Section:
 
     def only(self, allowed: Collection[str]) -> None:
         """Refuse an entry whose key is not in `allowed`."""
+        self._asked |= dict.fromkeys(allowed)
         for key in self.values:
             if key not in allowed:
-                raise self.error(key, f"unknown; allowed: {', '.join(allowed)}")
+                raise self.error(key, unknown(key, allowed))
+
+    def only_asked(self) -> None:
+        """Refuse an entry, here or in a section within, that no method has been asked for."""
+        self.only(self._asked)
+        for section in self._inner.values():
+            section.only_asked()
+
+    def has(self, key: str) -> bool:
+        """Return whether the file gives the entry `key`, which may be left out."""
+        self._asked[key] = None
+        return key in self.values
 
     def entry(self, key: str) -> Any:
         """Return the entry `key` as it is in the file."""
+        self._asked[key] = None
         if key not in self.values:
             raise self._error(f"{self._name(key)} is missing")
         return self.values[key]
 
     def section(self, key: str) -> Section:
         """Return the entry `key`, a mapping."""
+        return self._within(key, self.mapping(key))
+
+    def mapping(self, key: str) -> dict[str, Any]:
+        """Return the entry `key`, a mapping whose keys its reader checks."""
         value = self.entry(key)
         if not isinstance(value, dict) or not value:
             raise self._error(f"{self._name(key)}: a mapping expected, got {value!r}")
-        return Section(value, self._name(key), self._error)
+        return value
 
     def entries(self, key: str, optional: bool = False) -> list[Section]:
         """Return the entry `key`, a list of one mapping or more; optional: [] if it is missing."""
@@ -59,8 +79,11 @@ class Section:
         for i, entry in enumerate(value):
             if not isinstance(entry, dict):
                 raise self._error(f"{self._name(key)}[{i}]: a mapping expected, got {entry!r}")
-            found.append(Section(entry, f"{self._name(key)}[{i}]", self._error))
+            found.append(self._within(f"{key}[{i}]", entry))
         return found
+
+    def _within(self, key: str, values: dict[str, Any]) -> Section:
+        return self._inner.setdefault(key, Section(values, self._name(key), self._error))
 
     def text(self, key: str) -> str:
         """Return the entry `key`, a text that is not empty."""

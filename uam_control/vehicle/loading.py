@@ -74,6 +74,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     _check_hover(described)
     _check_servo(described.servo, servo)
     check_plant_numbers(top)
+    top.only_asked()
     return described
 
 
@@ -131,7 +132,7 @@ def _joint(entry: Section) -> Joint:
 
 
 def _arm(top: Section, joints: int) -> Arm | None:
-    if "arm" not in top.values:
+    if not top.has("arm"):
         return None
     arm = top.section("arm")
     return Arm(arm.numbers("mount", 3), arm.numbers("links", joints), arm.positive("magnet"))

@@ -12,7 +12,7 @@ NOT_OF_THE_PLANT = (
 
 
 def check_plant_numbers(top: Section) -> None:
-    """Raise the section's error if a number of air, sensors, variation or magnet is not usable."""
+    """Raise the section's error if an entry that only plant or drivers read is not usable."""
     air = top.section("air")
     air.numbers("drag", 3)
     air.numbers("wind", 3)
@@ -28,13 +28,22 @@ def check_plant_numbers(top: Section) -> None:
         mocap.not_negative(name)
     for name in ("gyro_noise", "gyro_bias", "accelerometer_noise", "accelerometer_bias"):
         imu.not_negative(name)
+    if mocap.has("payload"):
+        mocap.switch("payload")
     for sensor in (mocap, imu, joints):
         sensor.whole("latency_ticks")
-    top.section("servos").whole("command_latency_ticks")
+    servos = top.section("servos")
+    servos.whole("command_latency_ticks")
+    for name in filter(servos.has, ("torque_per_current", "current_unit")):
+        servos.positive(name)
     variation = top.section("variation")
     for name in ("mass", "inertia"):
         variation.positive(name)
     variation.numbers("payload_offset", 2)
+    if variation.has("base_offset"):
+        variation.numbers("base_offset", 2)
+    if variation.has("tip_mass"):
+        variation.not_negative("tip_mass")
     magnet = top.section("magnet")
     magnet.positive("holding_force")
     magnet.positive("gap_scale")

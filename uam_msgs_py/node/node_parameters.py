@@ -17,6 +17,7 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 
+from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import (
     Choice,
     ParameterError,
@@ -173,4 +174,4 @@ def refuse_unknown(node: Node, shown: str = "") -> None:
             continue
         if name not in shared_section():  # it reads the files: only for a name in question
             known = sorted(name for name in node._parameters if not name.startswith(own))
-            raise ParameterError(f"{prefix}{name}: unknown; allowed: {', '.join(known)}")
+            raise ParameterError(f"{prefix}{name}: {unknown(name, known)}")

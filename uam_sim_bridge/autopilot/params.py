@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.settings import configuration, yaml_file
+from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleDescription
 
@@ -160,9 +161,7 @@ class Parameters:
         the file differs from the vehicle's.
         """
         derived = vehicle.autopilot_parameters()
-        if file is None:
-            return cls(derived)
-        values = yaml_file.read(Path(file), ParameterError)
+        values = {} if file is None else yaml_file.read(Path(file), ParameterError)
         if not isinstance(values, dict):
             raise ParameterError(f"{file}: 'NAME: value' lines expected")
         for name in sorted(derived.keys() & values.keys()):
@@ -174,7 +173,8 @@ class Parameters:
         try:
             return cls(derived | values)
         except ParameterError as error:
-            raise ParameterError(f"{file}: {error}") from None
+            where = file or f"{vehicle.file}: autopilot: {vehicle.autopilot}"
+            raise ParameterError(f"{where}: {error}") from None
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
@@ -183,7 +183,7 @@ class Parameters:
         """Set one value; raises ParameterError with the allowed range, without a change."""
         definition = DEFINITIONS.get(name)
         if definition is None:
-            raise ParameterError(f"unknown autopilot parameter {name}")
+            raise ParameterError(f"autopilot parameter {name}: {unknown(name, DEFINITIONS)}")
         allowed = f"allowed: {definition.low:g} to {definition.high:g} {definition.unit}"
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{name}: {value!r} is not a number; {allowed}")

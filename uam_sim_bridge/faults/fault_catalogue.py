@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError
 from uam_sim_bridge.faults import (
     actuator_faults,
@@ -27,8 +28,8 @@ def make(name: object, values: dict[str, object]) -> Fault:
         raise FaultError(f"unknown fault {name!r}; there are: {', '.join(FAULTS)}")
     for parameter, value in values.items():
         if parameter not in FAULTS[name].specs():
-            known = ", ".join(FAULTS[name].specs()) or "none"
-            raise FaultError(f"{name}: {parameter}: unknown parameter; there are: {known}")
+            said = unknown(parameter, FAULTS[name].specs())
+            raise FaultError(f"{name}: {parameter}: {said}")
         if parameter in WHOLE and isinstance(value, float) and not value.is_integer():
             raise FaultError(f"{name}: {parameter}: {value!r} is not a whole number")
     try:

@@ -47,9 +47,7 @@ def legs(entry: Section, middle: Middle) -> tuple[Leg, ...]:
     if kind not in KINDS:
         raise entry.error("kind", f"{kind!r}, allowed: {', '.join(KINDS)}")
     allowed = WAYPOINT_KEYS if kind == "waypoints" else (*CURVE_KEYS, *SHAPES[kind])
-    for key in entry.values:
-        if key not in allowed:
-            raise entry.error(key, f"not an entry of {kind}, which has: {', '.join(allowed)}")
+    entry.only(allowed)
     pose = middle.chi.copy()
     if "arm_deg" in entry.values:
         pose[ARM] = np.radians(entry.numbers("arm_deg", len(middle.joints)))
@@ -129,6 +127,7 @@ def _sweeps(entry: Section, middle: Middle) -> tuple[Harmonic, ...]:
     """Return the harmonics of the joints: `cycles` per lap about the angle of the arm."""
     names, found = arm_coordinates(len(middle.joints)), []
     for one in entry.entries("sweep", True):
+        one.only(("joint", "amplitude_deg", "cycles"))
         joint = one.text("joint")
         if joint not in names:
             raise one.error("joint", f"{joint!r}, allowed: {', '.join(names)}")

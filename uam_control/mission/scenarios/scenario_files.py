@@ -69,9 +69,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
     Without arm_start the arm begins stowed.
     """
     top = read_section(file, ScenarioError)
-    for key in top.values:
-        if key not in KEYS:
-            raise top.error(key, f"not an entry of a scenario, which has: {', '.join(KEYS)}")
+    top.only(KEYS)
     arm_start = _arm_start(top, vehicle)
     timed = "landing" in top.values or "moves" in top.values
     if "trajectory" in top.values and not timed:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uam_control.mission import Scenario, load_scenario
-from uam_control.settings import yaml_file
+from uam_control.settings.section import read_section
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.campaign.fault_outcome import Promise, read_promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
@@ -159,10 +159,9 @@ def read(
 
 
 def _document(file: Path) -> dict[str, Any]:
-    document = yaml_file.read(file, FaultError)
-    if not isinstance(document, dict) or sorted({*document} - {DURATIONS}) != sorted(KEYS):
-        raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
-    return document
+    top = read_section(file, FaultError)
+    top.only((*KEYS, DURATIONS))
+    return top.values | {key: top.entry(key) for key in KEYS}
 
 
 def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, Any]]:

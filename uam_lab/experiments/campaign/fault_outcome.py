@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.settings.names import unknown
 from uam_control.supervision import State
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults import FaultError
@@ -143,8 +144,11 @@ def read_promise(given: Any, where: str) -> Promise:
 
     Raises FaultError.
     """
-    entries = {"outcome", "within", "because"}
-    if not isinstance(given, Mapping) or not {"outcome"} <= set(given) <= entries:
+    entries = ("outcome", "within", "because")
+    for key in given if isinstance(given, Mapping) else ():
+        if key not in entries:
+            raise FaultError(f"{where}: promise: {key}: {unknown(key, entries)}")
+    if not isinstance(given, Mapping) or "outcome" not in given:
         raise FaultError(
             f"{where}: promise: {{outcome: ..., within: seconds, because: text}} expected"
         )

@@ -43,13 +43,9 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
     """
     file = file or path("campaign/robustness.yaml")
     top = read_section(file, VariationError)
-    known = set(NAMES) | set(DELAYS)
-    if not set(NAMES) <= set(top.values) <= known:
-        raise VariationError(
-            f"{file}: expected are {', '.join(NAMES)} and, if wanted, {', '.join(DELAYS)}"
-        )
+    top.only(NAMES + DELAYS)
     found = {}
-    for name in top.values:
+    for name in (*NAMES, *filter(top.has, DELAYS)):
         found[name] = low, high = top.numbers(name, 2)
         if not 0.0 <= low <= high or (name in FACTORS and low == 0.0):
             above = "above 0" if name in FACTORS else "0 or more"

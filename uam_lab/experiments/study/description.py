@@ -95,9 +95,9 @@ def load_study(name_or_file: str) -> Study:
     file = configuration.named("studies", name_or_file, suffixes=(".yaml",))
     top = read_section(file, StudyError)
     document = top.values
-    if set(document) != set(KEYS):
-        odd = sorted(set(KEYS) ^ set(document))
-        raise StudyError(f"{file}: {odd[0]}: missing, or no entry of a study")
+    top.only(KEYS)
+    for key in KEYS:
+        top.entry(key)
     _check(top)
     given = top.section("rows")
     rows = tuple(_row(given.section(label), label) for label in given.values)
@@ -121,6 +121,7 @@ def _mapping(section: Section, key: str) -> Section:
 
 
 def _row(entry: Section, label: str) -> Row:
+    entry.only(("law", "frozen", "profiles", "conditions", "autopilot", "common"))
     law, frozen = (entry.text(k) if k in entry.values else "" for k in ("law", "frozen"))
     if law and law not in catalogue.LAWS:
         raise entry.error("law", f"'{law}': {', '.join(catalogue.LAWS)} are allowed")
@@ -143,6 +144,8 @@ def _row(entry: Section, label: str) -> Row:
 
 
 def _condition(label: str, base: Section, entry: Section) -> Condition:
+    base.only(("vehicle", "trajectory"))
+    entry.only(("vehicle", "trajectory", "of", "value"))
     vehicle, trajectory = (
         _mapping(base, key).values | _mapping(entry, key).values
         for key in ("vehicle", "trajectory")

@@ -149,7 +149,7 @@ def load_space(
     """
     file = configuration.named("tuning", name_or_file)
     top = read_section(file, TuningError)
-    if "judged_as" in top.values:  # flights and cost of another space, for a fair comparison
+    if top.has("judged_as"):  # flights and cost of another space, for a fair comparison
         other = configuration.named("tuning", top.text("judged_as"))
         top.values = {**read_section(other, TuningError).values, **top.values}
     law = top.text("controller")
@@ -157,8 +157,8 @@ def load_space(
         there = ", ".join(catalogue.LAWS)
         raise TuningError(f"{file}: unknown controller '{law}'; there are: {there}")
     start = start or default_profile(law, vehicle)
-    two = "delay_margin" in top.values
-    return Space(
+    two = top.has("delay_margin")
+    space = Space(
         file.stem,
         start,
         tuple(_knob(entry, start) for entry in top.entries("knobs")),
@@ -166,14 +166,15 @@ def load_space(
         _cost(top.section("cost"), len(start.vehicle.coordinates)),
         top.section("delay_margin").number("at_least") if two else None,
     )
+    top.only_asked()
+    return space
 
 
 def _flight(entry: Section) -> dict[str, Any]:
-    entry.only(("payload_mass", "seed", "scenario", "vehicle", "plant_preset"))
-    names = {"scenario", "plant_preset"}.intersection(entry.values)
+    names = filter(entry.has, ("scenario", "plant_preset"))
     given: dict[str, Any] = {name: entry.text(name) for name in sorted(names)}
-    if entry.values.get("vehicle"):
-        given["vehicle"] = entry.section("vehicle").values
+    if entry.has("vehicle") and entry.values["vehicle"]:
+        given["vehicle"] = entry.mapping("vehicle")
     return {
         **given,
         "payload_mass": entry.not_negative("payload_mass"),

@@ -49,8 +49,12 @@ def added(changes: Mapping[str, object], effects: Effects) -> dict[str, object]:
 def _switch(text: str) -> tuple[str, object]:
     name, colon, rest = text.partition(":")
     if colon:
-        pairs = [part.partition("=") for part in rest.split(",")]
-        return name, {key: _number(text, value) for key, _, value in pairs}
+        found: dict[str, float] = {}
+        for key, _, value in (part.partition("=") for part in rest.split(",")):
+            if key in found:
+                raise PlantError(f"--effect {text}: {key} is given twice")
+            found[key] = _number(text, value)
+        return name, found
     name, _, state = text.partition("=")
     if state not in ("", "on", "off"):
         raise PlantError(f"--effect {text}: NAME, NAME=off or NAME:parameter=value,... expected")
