@@ -27,6 +27,23 @@ BROKEN = {  # what replaces a text of a part → what is said
     "part no XML": ("parts/world.xml", "</mujoco", "</mujo"),
     "no time step": ("hexa.xml", "<worldbody>", '<option timestep="0"/><worldbody>'),
     "another model": ("parts/arm_2r.xml", "alpha_1", "beta"),
+    "a joint twice": (
+        "hexa.xml",
+        "</worldbody>",
+        '<body><joint name="alpha_1"/></body></worldbody>',
+    ),
+    "a body twice": ("hexa.xml", "</worldbody>", '<body name="base"/></worldbody>'),
+    "no base": ("hexa.xml", 'name="base"', 'name="bsae"'),
+    "include of each other": (
+        "parts/world.xml",
+        "<worldbody>",
+        '<include file="hexa.xml"/><worldbody>',
+    ),
+    "no picture": (
+        "hexa.xml",
+        "<worldbody>",
+        '<asset><texture name="t" type="2d" file="no.png"/></asset><worldbody>',
+    ),
     "no arm": ("hexa.xml", '<include file="parts/arm_2r.xml"/>', ""),
 }
 

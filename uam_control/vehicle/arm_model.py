@@ -195,6 +195,8 @@ class _Reader:
         parents = {child: parent for parent in self._root.iter() for child in parent}
         for body in self._root.iter("body"):
             for joint in body.findall("joint"):
+                if joint.get("name") in bodies and joint.get("name") in self._names:
+                    raise ValueError(f"two joints '{joint.get('name')}'")
                 bodies[joint.get("name")] = (body, joint)
         if missing := [name for name in self._names if name not in bodies]:
             attached = any(self._root.iter("attach"))  # a part that is not read here may have it

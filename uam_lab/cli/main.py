@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 
+from uam_lab.cli import output
 from uam_lab.flights.processes import child, middleware
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.ros import FORKER
@@ -25,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     if arguments is None:
         _begin_in_utf_8()
+        output.begin()
     os.environ["MPLBACKEND"] = "agg"  # figures are files; a notebook's backend may be missing here
     given = sys.argv[1:] if arguments is None else arguments
     with _ended_by_interrupt():

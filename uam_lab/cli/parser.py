@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.settings.visible_text import visible
+from uam_lab.cli import output
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.terminal import say
@@ -92,12 +93,13 @@ def parsed(given: Sequence[str]) -> argparse.Namespace:
 def run(options: argparse.Namespace) -> int:
     """Run the chosen command; return the exit status."""
     try:
-        return options.run(options)
+        status = options.run(options)
+        if lost := output.reason():
+            say(f"uam {options.command}: stdout: {lost}: lines are missing", error=True)
+        return status or (NOT_WRITTEN if lost else 0)
     except KeyboardInterrupt:
         say(f"uam {options.command}: interrupted", error=True)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
-        return 1
     except (*USER_ERRORS, OSError) as error:
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
