@@ -57,6 +57,8 @@ class OwnSimulator(Plant):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
     engine, scene = sys.argv[1:3]
     out = Path(sys.argv[3]) if len(sys.argv) > 3 else new_folder(Path("results"), "own_simulator")
     with Flight(plant="own_simulator:OwnSimulator", engine=engine, scenario=scene, out=out) as own:

@@ -31,6 +31,8 @@ def trajectory(log, topic):
 
 def main():
     """Print the errors of the ticks in which position and attitude are controlled."""
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
     log = sys.argv[1]
     reference = trajectory(log, "/uam/reference").dropna()  # on the ground: the arm only
     error = (trajectory(log, "/uam/truth/state") - reference).dropna()

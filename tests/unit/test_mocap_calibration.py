@@ -160,6 +160,9 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
         np.testing.assert_allclose(read.quaternion, one.quaternion, atol=1e-8)
 
 
+HEADER = "t,x,y,z,qw,qx,qy,qz\n"
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
@@ -171,6 +174,11 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
         ),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,0,0,0,0\n", "line 2: not a pose"),
         ("t,x,y,z,qw,qx,qy,qz\n1,2,3,4,1,0,0,0\n1,2,3,4,1,0,0,0\n", "line 3: t does not grow"),
+        (
+            f"{HEADER}1,0,0,0,1,0,0,0\n2,800,0,0,1,0,0,0\n",
+            "line 3: 800 m from .*; give x, y, z in m",
+        ),
+        (f"{HEADER}0,0,0,0,1,0,0,0\n8,0,0,0,1,0,0,0\n", "8 s apart, .*; give times in seconds"),
     ],
 )
 def test_a_recording_that_is_none_is_refused(tmp_path, content, reason):

@@ -14,6 +14,8 @@ from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.devices.mocap.measurement import TimedPose
 
 COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")  # s, m
+SLOWEST = 0.5  # [s] between two poses; in ms or us they are farther apart
+ROOM = 50.0  # [m] in which a recording is; in mm it is larger
 
 
 def write(file: Path, poses: Sequence[TimedPose]) -> None:
@@ -27,7 +29,7 @@ def write(file: Path, poses: Sequence[TimedPose]) -> None:
 
 
 def read(file: Path) -> list[TimedPose]:
-    """Read the poses; raises MocapError with the line."""
+    """Read the poses; raises MocapError with the line, also for other units than s and m."""
     table = CsvTable(file, MocapError)
     missing = [name for name in COLUMNS if name not in table.header]
     if missing:
@@ -42,5 +44,14 @@ def read(file: Path) -> list[TimedPose]:
         if found and numbers[0] <= found[-1].time:
             raise table.error(line, "t does not grow")
         pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
+        if found and (far := max(abs(pose.position - found[0].pose.position))) > ROOM:
+            apart = f"{far:g} m from the first pose, at most {ROOM:g} m allowed"
+            raise table.error(line, f"{apart}; give x, y, z in metres")
         found.append(TimedPose(numbers[0], pose))
+    apart = float(np.median(np.diff([one.time for one in found]))) if len(found) > 1 else 0.0
+    if apart > SLOWEST:
+        raise MocapError(
+            f"{file}: column t: poses {apart:g} s apart, at most {SLOWEST:g} s allowed; "
+            "give times in seconds"
+        )
     return found
