@@ -101,8 +101,13 @@ def test_a_flight_without_a_motor_is_lost():
 
 
 def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
-    for text in ("imu_dropout@hover+1", "mavlink_cut@hover+1"):
+    for text, reason in (
+        ("imu_dropout@hover+1", "no state of the estimator for"),
+        ("mavlink_cut@take-off+0.4", "no lift-off: the autopilot is silent"),
+        ("mavlink_cut@hover+1", "no message of the autopilot for"),
+    ):
         flight, series, figures = flown(text)
+        assert reason in flight.ended_by + flight.mission.output.abort_reason
         assert classify(series, figures) == "failsafe", text
         assert figures["shortfalls"], text
         height, speed = flight.plant.truth().state[:2, 2]

@@ -15,6 +15,7 @@ from supervised import S500, flying, mermaid, observation, watch, with_state
 from uam_control.mission.course import COURSES, NEXT, Course, Cue
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import (
+    Authority,
     Event,
     Guide,
     Inputs,
@@ -235,6 +236,16 @@ def test_a_vehicle_that_does_not_lift_off_gives_up(height, on_ground, state):
     decision = watch(supervisor, seen, 0.2, 11.0 + S500.liftoff_timeout - 0.1)
     assert decision.state is state
     assert decision.cause == "no lift-off: too little thrust for the weight"
+
+
+def test_no_lift_off_without_the_autopilot_is_not_the_weight():
+    supervisor = Supervisor(S500)
+    supervisor.start()
+    seen = observation(on_ground=True, authority=Authority(lands=True))
+    seen.state[0, 2], seen.reference[0, 2] = 0.0, S500.airborne_height + 0.01
+    decision = watch(supervisor, seen, S500.liftoff_timeout + 0.2, 10.0)
+    assert decision.state is State.DISARMED
+    assert decision.cause == "no lift-off: the autopilot is silent, or lands by itself"
 
 
 def test_poses_away_from_the_estimate_fly_blind_after_the_same_time_as_no_poses():

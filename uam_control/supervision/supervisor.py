@@ -52,6 +52,10 @@ class Decision(NamedTuple):
     regains: int
 
 
+TOO_HEAVY = "no lift-off: too little thrust for the weight"
+NOT_FOLLOWED = "no lift-off: the autopilot is silent, or lands by itself"
+
+
 class StateTransition(NamedTuple):
     """A transition at `stamp` [s]."""
 
@@ -282,7 +286,7 @@ class Supervisor:
         if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
         elif self.state is State.TAKING_OFF and self._stays_behind(seen):
-            cause = "no lift-off: too little thrust for the weight"
+            cause = NOT_FOLLOWED if seen.authority.lands else TOO_HEAVY
             if seen.on_ground:
                 yield Event.NO_LIFTOFF, cause
             yield Event.LAND_LIMIT, cause

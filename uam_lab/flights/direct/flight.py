@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from uam_lab.flights.direct.steady.ticks import SteadyTicks
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
+STILL = 1.0  # [s] without a state, from which on the reason of an end names it
 
 
 class DirectFlight:
@@ -117,7 +118,9 @@ class DirectFlight:
                 if progress is not None:
                     progress(output.time, output.phase)
                 if settled.over(plant.time, self.armed):
-                    self.ended_by = DISARMED
+                    silent = plant.time - self.control.mission.ahead / SECOND
+                    lost = f"no state of the estimator for {silent:.1f} s: IMU lost? "
+                    self.ended_by = (lost if silent > STILL else "") + DISARMED
                     break
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
                 reasons = "; ".join(self.sequence.reasons) or "no reason"
