@@ -13,7 +13,7 @@ from uam_control.maths.compiled import jit
 
 # [s], in order of their size
 AHEAD = 0.05  # a pose may be so far ahead of the IMU, or behind the last one: more is a wrong clock
-STALE = 0.1  # commands, and a bias of the IMU: no longer valid
+STALE = 0.1  # commands, a bias of the IMU: no longer valid; poses: no take-off
 FORWARDED = 0.25  # poses: to the autopilot, and in the comparisons of supervisor and grasp
 HOLD = 0.25  # poses, joint angles, gains of a controller: the vehicle holds, then lands
 AHEAD_FOR = 0.35  # for so long poses wait for an IMU that comes late; more is an error of a clock
@@ -22,6 +22,7 @@ LAND = 0.75  # reports of autopilot and bridge: the vehicle lands
 FAILSAFE = 1.0  # poses, and the estimate: the autopilot descends by itself
 BRIDGED = FAILSAFE  # poses: the estimate's past reaches back so far; an older one is none for all
 DISCONNECTED = 3.0  # heartbeats of the autopilot
+REJECTED = 10.0  # poses off the estimate: for so long; a failsafe is on the ground before
 OTHER_CLOCK = 10.0  # stamps: of a clock that the autopilot does not know, not of an old pose
 
 

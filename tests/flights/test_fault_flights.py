@@ -153,6 +153,37 @@ def test_what_is_known_to_be_wrong_does_not_reach_the_autopilot(seed, texts):
     assert classify(series, figures) == "failsafe" and not flight.armed
 
 
+@pytest.mark.parametrize(
+    ("seed", "text"),
+    [  # the estimate followed these poses in *blind*: 176 degrees, 59 m high, 33 m/s
+        (3, "mocap_swap@carry+0.2"),
+        (5, "mocap_swap@carry+0:axes=yz"),
+        (7, "mocap_swap@carry+0.2+3:axes=xz"),
+    ],
+)
+def test_wrong_poses_are_not_followed_before_the_vehicle_is_down(seed, text):
+    _, series, figures = flown(text, scenario=QUICK_PICK, seed=seed)
+    assert classify(series, figures) == "failsafe"
+    assert np.degrees(series.tilt.max()) < 20.0 and series["truth.z"].max() < 1.5
+
+
+@pytest.mark.parametrize(
+    ("text", "outcome"),
+    [  # a level descent came down on the stand: 160 degrees
+        (
+            "@pick+2.5+1.0:unit=companion,gyro=0.185,accelerometer=-5.13,axis=z,over=0.2",
+            "completed",
+        ),
+        ("@pick+2.2:unit=companion,gyro=0,accelerometer=3,axis=x,over=1", "failsafe"),
+    ],
+)
+def test_beside_the_stand_a_faulty_imu_moves_the_vehicle_clear_of_it_first(text, outcome):
+    flight, series, figures = flown("imu_bias" + text, scenario=QUICK_PICK, seed=2)
+    assert classify(series, figures) == outcome, figures["shortfalls"]
+    assert np.degrees(series.tilt.max()) < 25.0
+    assert State.BLIND in [change.target for change in flight.mission.changes]
+
+
 @pytest.mark.parametrize(("late", "seed"), [(0.26, 1), (0.5, 2), (0.75, 1)])
 def test_a_landing_beside_the_stand_moves_clear_of_it_first(late, seed):
     text = f"mocap_latency@take-off+3:delay={late}"
@@ -195,6 +226,7 @@ def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
         ("clock_jump@take-off:step=-0.219", 5, "failsafe"),  # 180 deg, 2.4 m/s
         ("clock_jump@take-off+1.434+1.0:step=-0.378", 3, "completed"),  # 1.3 m/s
         ("clock_jump@take-off+0.4:step=0.2", 2, "failsafe"),
+        ("clock_jump@start:step=-0.15", 3, "failsafe"),  # 46 deg; now it does not take off
     ],
 )
 def test_poses_of_a_wrong_clock_are_missing_poses(text, seed, outcome):

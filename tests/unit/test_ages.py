@@ -25,6 +25,9 @@ def test_the_order_of_the_ages_makes_sense():
     assert ages.AHEAD < ages.STALE < ages.FORWARDED <= ages.HOLD < ages.UNAIDED < ages.BRIDGED
     assert ages.BRIDGED == ages.FAILSAFE < ages.DISCONNECTED < ages.OTHER_CLOCK
     assert ages.HOLD < ages.AHEAD_FOR and ages.HOLD < ages.LAND < ages.FAILSAFE
+    # the estimate does not follow wrong poses until a failsafe is on the ground (from 3 m)
+    blind = ages.FAILSAFE + SupervisionParameters().blind_time
+    assert blind + 3.0 / 0.7 < ages.REJECTED <= ages.OTHER_CLOCK
     # a stream that is lost is seen here before the autopilot leaves OFFBOARD by itself
     assert ages.STALE < LINK_GAP < STREAM_GAP <= HoldParameters().release_time
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control.ages import REJECTED
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.pose_gate import PoseGate
 
@@ -74,13 +75,13 @@ def test_biases_are_unsettled_for_a_second_after_a_gap_but_not_by_a_contradictio
     assert not gate.settled(3.25) and gate.settled(3.5)
 
 
-def test_poses_are_refused_for_two_seconds_and_then_followed_for_more_than_one():
+def test_poses_are_refused_for_ten_seconds_and_then_followed_for_more_than_one():
     gate = PoseGate(0.4)
     answers(gate, quarters(0.0, 2.0))
-    far = [(stamp, 0.5) for stamp, _ in quarters(2.0, 6.0)]
-    # refused from 2 to 4 s (nine), used from 4.25 to 5.25 s (five), then refused again
-    assert answers(gate, far) == [True] * 9 + [False] * 5 + [True] * 2
-    assert gate.refused == 11
+    far = [(stamp, 0.5) for stamp, _ in quarters(2.0, 14.0)]
+    # refused from 2 to 12 s, used from 12.25 to 13.25 s (five), then refused again
+    assert answers(gate, far) == [True] * 41 + [False] * 5 + [True] * 2
+    assert gate.refused == 43
 
 
 def test_no_rejection_while_the_imu_contradicts_the_estimate():
@@ -104,8 +105,8 @@ def test_no_rejection_after_a_gap_of_poses_or_imu():
 def test_no_rejection_is_longer_than_its_limit(distances, limit):
     gate = after_a_while()
     gate.distance = limit
-    refused = refusals(gate, distances)
-    longest = round(2.0 / PERIOD) + 1
+    refused = answers(gate, [(0.04 * k, distance) for k, distance in enumerate(distances)])
+    longest = round(REJECTED / 0.04) + 1
     assert all(not all(refused[k : k + longest + 1]) for k in range(len(refused) - longest))
 
 
@@ -135,6 +136,6 @@ def test_the_estimate_follows_a_small_jump_and_waits_for_the_end_of_a_large_one(
 
 
 def test_a_jump_that_stays_is_accepted_in_the_end():
-    estimator, worst = hover(np.array([1.0, 0.0, 0.0]), 2.5)
+    estimator, worst = hover(np.array([1.0, 0.0, 0.0]), REJECTED + 0.5)
     assert worst > 0.9
     np.testing.assert_allclose(estimator.update()[0, :3], 0.0, atol=0.05)

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import math
 
-from uam_control.ages import UNAIDED
+from uam_control.ages import REJECTED, UNAIDED
 
 CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
 MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
-LONGEST = 2.0  # s, longest rejection: later the estimate without poses is worse than the poses
 
 
 class PoseGate:
@@ -44,7 +43,7 @@ class PoseGate:
             return False
         if self._rejecting_since is None:
             self._rejecting_since = stamp
-        if stamp - self._rejecting_since > LONGEST:
+        if stamp - self._rejecting_since > REJECTED:
             self._rejecting_since = None
             self.suspend(stamp)
             return False

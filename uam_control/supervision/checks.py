@@ -26,6 +26,7 @@ CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop
 REFERENCE_DELAY = "delay for the reference"
 DELAYS = (SETPOINT_DELAY, REFERENCE_DELAY)  # of the link, known before the take-off
 POSES_OFF = "motion capture"
+CONTRADICTION = "motion capture and IMU"
 
 
 class Check(NamedTuple):
@@ -34,7 +35,8 @@ class Check(NamedTuple):
     hold, land, failsafe: name of a parameter or of a limit in s that follows from parameters, or a
     number. in_flight: checked only while airborne.
     sign: -1 if a smaller value is worse. land_after, failsafe_after: names of the parameters with
-    the time beyond the limit before the reaction. reading: the value's name in `Readings`. blind:
+    the time beyond the limit before the reaction. start: limit before the take-off, where it is
+    lower than in flight. reading: the value's name in `Readings`. blind:
     beyond the failsafe limit the vehicle still flies on the IMU for `blind_time`.
     """
 
@@ -43,6 +45,7 @@ class Check(NamedTuple):
     hold: str | float = NONE
     land: str | float = NONE
     failsafe: str | float = NONE
+    start: str | float = NONE
     in_flight: bool = False
     sign: int = 1
     land_after: str = "land_after"
@@ -81,7 +84,7 @@ CHECKS = (
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1,
           reading="battery"),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
-          failsafe="mocap_age_failsafe", reading="mocap_age", blind=True),
+          failsafe="mocap_age_failsafe", start="mocap_age_start", reading="mocap_age", blind=True),
     Check("mocap pose", "{name} has been the same for {value:.2f} s, {limit:g} s allowed",
           "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True, reading="mocap_still",
           blind=True),
@@ -102,7 +105,7 @@ CHECKS = (
     Check(LOOP_DELAY, "measured setpoint delay {value:.3f} s exceeds {limit:.3g} s of the loops' "
           "margin", land="setpoint_delay_land", failsafe="setpoint_delay_failsafe",
           in_flight=True, land_after="delay_after", failsafe_after="delay_after"),
-    Check("motion capture and IMU", "{name} contradict each other by {value:.1f} m/s^2, {limit:g} "
+    Check(CONTRADICTION, "{name} contradict each other by {value:.1f} m/s^2, {limit:g} "
           "m/s^2 allowed", failsafe="contradiction_failsafe", in_flight=True,
           reading="contradiction"),
     Check(REFERENCE_DELAY, "setpoint delay {value:.3f} s exceeds {limit:.3g} s that the reference "
@@ -232,8 +235,9 @@ class Checks:
         Value and limit have the sign of the check: larger is worse. An unknown value is -inf.
         """
         for check, value, limits in zip(CHECKS, self._values.tolist(), self._limits, strict=True):
-            if not check.in_flight and min(limits) < NONE:
-                yield check, value, min(limits)
+            lowest = min(*limits, self._limit(check, check.start))
+            if not check.in_flight and lowest < NONE:
+                yield check, value, lowest
 
 
 def _cause(check: Check, value: float, limit: float) -> str:

@@ -57,6 +57,9 @@ class SupervisionLimits(ParameterSet):
     battery_land: float = _land(0.15, "state of charge", "1", 0.0, 1.0)
     mocap_age_hold: float = _hold(ages.HOLD, "age of the mocap pose", "s", 0.02, 10.0)
     mocap_age_failsafe: float = _failsafe(ages.FAILSAFE, "age of the mocap pose", "s", 0.02, 60.0)
+    mocap_age_start: float = number(
+        ages.STALE, "age of the mocap pose that prevents the take-off", "s", 0.02, 10.0
+    )
     mocap_distance_hold: float = _hold(
         0.15, "distance of the mocap pose from the estimate", "m", 0.05, 1000.0
     )

@@ -17,7 +17,13 @@ from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
 from uam_control.settings.plain_members import plain_members
-from uam_control.supervision.checks import DELAYS, POSES_OFF, Checks
+from uam_control.supervision.checks import (
+    CONTRADICTION,
+    DELAYS,
+    POSES_OFF,
+    Checks,
+    ExceededLimit,
+)
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
@@ -244,7 +250,7 @@ class Supervisor:
         if seen.authority.landed:
             yield Event.DOWN, f"{self.cause}; {Event.DOWN.value}"
         if level is Level.FAILSAFE:
-            blind = finding.blind  # the estimate then says nothing about the ground
+            blind = self._flies_on(finding, seen)  # the estimate says nothing about the ground
             if seen.authority.landed if blind else seen.on_ground:
                 yield Event.HARD_LIMIT_ON_GROUND, cause
             yield Event.BLIND_LIMIT if blind else Event.HARD_LIMIT, cause
@@ -338,6 +344,16 @@ class Supervisor:
     def _lands_on(self) -> bool:
         """Whether it became blind in a landing."""
         return self._interrupted is State.LANDING
+
+    def _flies_on(self, finding: ExceededLimit, seen: Observation) -> bool:
+        """Whether the vehicle flies blind first.
+
+        With a contradiction only beside a stand, where the level descent of a failsafe topples it:
+        if the IMU is right and the poses are wrong, every second more leads away.
+        """
+        began = self.state is State.BLIND and self._failed == finding.name
+        beside = finding.name == CONTRADICTION and seen.beside_stand
+        return finding.blind or began or beside
 
     def _agrees(self) -> Event:
         """Return the event of poses that agree again: a take-off given up, or a landing, lands."""

@@ -113,7 +113,8 @@ class ClockJump(PoseFault):
     step: float = number(0.5, "error of the clock, positive if ahead", "s", -100.0, 100.0)
 
     def altered(self, pose: Pose, now: Occurrence) -> Pose | None:
-        return max(0.0, pose[0] + self.step), *pose[1:]
+        stamp = pose[0] + self.step
+        return (stamp, *pose[1:]) if stamp >= 0.0 else None  # no message has a stamp below zero
 
 
 FAULTS = (
