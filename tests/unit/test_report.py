@@ -269,3 +269,16 @@ def test_outcomes_in_words():
     assert (
         flight_summary.landing_story({"landing_error_m": 1.234}) == "1.23 m from the landing point"
     )
+
+
+def test_a_long_name_of_a_phase_cuts_no_number(flight_folder):
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    named = metrics | {"phases": [{**metrics["phases"][0], "phase": "to the far gate " * 8}]}
+    said = []
+    for one in (metrics, named):
+        out = io.StringIO()
+        Terminal(file=out, width=80).print(console.phase_table(one))
+        assert "…" not in out.getvalue()
+        said.append({word.strip() for word in re.split("[│┃\n]", out.getvalue())})
+    rows = console.flight_summary.phase_rows(named)
+    assert set(rows[0].texts[1:]) <= said[1]

@@ -15,6 +15,8 @@ from uam_control.laws import catalogue
 from uam_lab.records.results.terminal import Terminal
 from uam_lab.report.facts import flight_summary
 
+NUMBER = 6  # [characters] of a column of numbers, at least
+
 
 @contextmanager
 def reporting(console: Terminal) -> Iterator[Callable[[str], None]]:
@@ -78,8 +80,10 @@ def phase_table(metrics: Mapping[str, Any]) -> Table:
     """Return the table of the errors of every phase."""
     table = Table(title="RMS error by phase", title_justify="left", padding=(0, 0, 0, 1))
     for heading in flight_summary.PHASE_HEADINGS:
-        first = heading == "phase"
-        table.add_column(heading, justify="left" if first else "right", no_wrap=first)
+        if heading == "phase":  # a long name is folded, no number is cut
+            table.add_column(heading, overflow="fold")
+        else:
+            table.add_column(heading, justify="right", min_width=NUMBER)
     for row in flight_summary.phase_rows(metrics):
         table.add_row(*row.texts, style="bold" if row.whole else "")
     return table
