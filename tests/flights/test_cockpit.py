@@ -99,8 +99,8 @@ def scene(page) -> np.ndarray:
 
 
 def field(page, label: str):
-    """The text field below a label; the page does not join the two."""
-    return page.locator(f"xpath=//*[normalize-space(text())='{label}']/following::input[1]")
+    """The text field below a label, which may be broken between its parts."""
+    return page.locator(f"xpath=//label[normalize-space(.)='{label}']/following::input[1]")
 
 
 def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
