@@ -1,6 +1,6 @@
 """Draws the frames of servos and autopilot: python docs/draw_devices.py [arm.png autopilot.png]
 
-For docs/arm_hardware.md and docs/px4.md.
+For docs/hardware.md and docs/autopilot.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Draws the frames of docs/mocap_hardware.md: python docs/draw_mocap.py [picture.png]"""
+"""Draws the frames of docs/hardware.md: python docs/draw_mocap.py [picture.png]"""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import os
 import resource
 from pathlib import Path
 
-PRIORITY = 70  # of SCHED_FIFO, 1..99; above those of docs/companion.md for nodes
+PRIORITY = 70  # of SCHED_FIFO, 1..99; above those of docs/hardware.md for nodes
 TASKS = Path("/proc/self/task")
 
 

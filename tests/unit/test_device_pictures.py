@@ -14,6 +14,6 @@ def test_the_pictures_are_drawn_and_shown(tmp_path, monkeypatch):
     pictures = tmp_path / "arm.png", tmp_path / "autopilot.png"
     module.draw(*pictures)
     assert all(one.stat().st_size > 10_000 for one in pictures)
-    for page, picture in (("arm_hardware", "arm_frames"), ("px4", "autopilot_frames")):
+    for page, picture in (("hardware", "arm_frames"), ("autopilot", "autopilot_frames")):
         assert f"images/{picture}.png" in (ROOT / f"docs/{page}.md").read_text()
         assert (ROOT / f"docs/images/{picture}.png").exists()

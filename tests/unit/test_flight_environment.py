@@ -105,7 +105,7 @@ def test_a_middleware_that_is_not_installed_is_named_before_ros_ends_the_process
             },
             [],
             "ROS does not start: SECURITY ERROR: directory '/no/such/keys/enclaves' does not exist"
-            "; ROS_SECURITY_ENABLE is true: unset it, or docs/security.md",
+            "; ROS_SECURITY_ENABLE is true: unset it, or docs/interfaces.md",
         ),
         ({}, ["-r", "uam/state:=x y"], "Couldn't parse remap rule: '-r uam/state:=x y'"),
     ],

@@ -1,4 +1,4 @@
-"""docs/magnet_hardware.md names parameters, defaults and periods of the code."""
+"""docs/hardware.md names parameters, defaults and periods of the code."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.modes import MavCmd
 from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs/magnet_hardware.md").read_text()
+PAGE = (Path(__file__).resolve().parents[2] / "docs/hardware.md").read_text()
 
 
 @pytest.mark.parametrize("kind", [SwitchingParameters, AutopilotMagnetParameters])

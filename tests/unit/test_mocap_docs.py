@@ -1,4 +1,4 @@
-"""docs/mocap_hardware.md: its picture is drawn, its limits and parameters are those of the code."""
+"""docs/hardware.md: its picture is drawn, its limits and parameters are those of the code."""
 
 import importlib.util
 import math
@@ -11,7 +11,7 @@ from uam_sim_bridge.devices.mocap.calibration import ENTRIES
 from uam_sim_bridge.devices.mocap.library_source import SYSTEMS
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs/mocap_hardware.md").read_text()
+PAGE = (ROOT / "docs/hardware.md").read_text()
 
 
 def test_the_nominal_calibrations_have_the_entries_of_the_page():

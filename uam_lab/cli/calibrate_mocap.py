@@ -42,7 +42,7 @@ examples:
 
 The command asks for two places: level on the floor, then again after a straight move nose first.
 It refuses measurements without sense (moved, tilted, turned, too short a way) and writes the file
-that the section `mocap` of the lab file names as its calibration. docs/mocap_hardware.md. Exit
+that the section `mocap` of the lab file names as its calibration. docs/hardware.md. Exit
 status: 0 written, 2 refused.
 """
 

@@ -32,7 +32,7 @@ examples:
   uam faults --list                                  all faults; those of cables at the end
 
 The same nodes, drivers and lab file as uam vehicle; only the names of the devices are replaced
-(lab.yaml in the result folder). Faults: docs/rehearsal.md.
+(lab.yaml in the result folder). Faults: docs/preflight.md.
 Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
 """
 

@@ -32,7 +32,7 @@ examples:
 It names each device that is missing and how to check it, waits, and uses a device that is plugged
 in later. Nothing arms by itself: uam start in another shell, or the cockpit's button. Ctrl-C on the
 ground ends all nodes and keeps the log; in the air it commands a landing, a second one ends the
-nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/companion.md. Exit
+nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/hardware.md. Exit
 status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 130 ended by Ctrl-C.
 """
 

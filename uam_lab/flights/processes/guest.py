@@ -81,5 +81,5 @@ def _reason(error: RCLError) -> str:
     """Return the text for the user, while the environment is that of ROS."""
     text = SOURCE.sub("", " ".join(str(error).split())).rstrip(". ")
     secured = os.environ.get(SECURITY) == "true" and "SECURITY" in text.upper()
-    hint = f"; {SECURITY} is true: unset it, or docs/security.md" if secured else ""
+    hint = f"; {SECURITY} is true: unset it, or docs/interfaces.md" if secured else ""
     return f"ROS does not start: {text}{hint}"

@@ -108,7 +108,7 @@ def _autopilot_advice(lab: Lab) -> str:
 
 def _imu_advice(lab: Lab) -> str:
     if lab.imu == AUTOPILOT:
-        return "comes with the autopilot's link; the rest: docs/px4.md"
+        return "comes with the autopilot's link; the rest: docs/autopilot.md"
     return f"ros2 topic hz /{topics.IMU.name} in the domain of this flight; is your driver in it?"
 
 

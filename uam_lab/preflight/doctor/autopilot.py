@@ -133,7 +133,8 @@ def describe(url: str, heard: Heard) -> Finding:
         f"{armed}, firmware {number}"
     )
     if not px4_like:
-        return warn("autopilot", found, "the bridge uses PX4's modes and parameters: docs/px4.md")
+        hint = "the bridge uses PX4's modes and parameters: docs/autopilot.md"
+        return warn("autopilot", found, hint)
     if armed == "armed":
         return warn("autopilot", f"{found}: ARMED", "mind the propellers; disarm before a flight")
     if heard.system != USUAL_SYSTEM:

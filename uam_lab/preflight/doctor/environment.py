@@ -60,18 +60,18 @@ VARIABLES = {
     ),
     "ROS_SECURITY_ENABLE": Variable(
         ": every node needs a key store and an enclave, those of uam fly too",
-        "docs/security.md, or unset {}",
+        "docs/interfaces.md, or unset {}",
         lambda value: value != "true",  # as rcl reads it
         ": security is off",
     ),
     "ROS_SECURITY_STRATEGY": Variable(
         ": with ROS_SECURITY_ENABLE=true no node starts without an enclave",
-        "docs/security.md, or unset {}",
+        "docs/interfaces.md, or unset {}",
         lambda value: value != "Enforce",
     ),
     "ROS_SECURITY_KEYSTORE": Variable(
         " has no folder enclaves: with ROS_SECURITY_ENABLE=true nodes find no keys",
-        "ros2 security create_keystore, see docs/security.md, or unset {}",
+        "ros2 security create_keystore, see docs/interfaces.md, or unset {}",
         lambda value: (Path(value) / "enclaves").is_dir(),
     ),
     "FASTDDS_BUILTIN_TRANSPORTS": Variable(

@@ -1,7 +1,7 @@
 """Checks before torque: are these the described servos, with the required settings and angles?
 
 Each problem is one line. What the bus cannot show is the sign of a joint that is stowed at 0, and
-two servos of one model swapped at equal angles: those are checked by hand (docs/arm_hardware.md).
+two servos of one model swapped at equal angles: those are checked by hand (docs/hardware.md).
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ class GpioLine:
         if gpiod is None:
             raise MagnetError(
                 "chip: the package gpiod is missing: pip install -e '.[hardware]' in a clone; "
-                "colcon: docs/install.md"
+                "colcon: docs/first_flight.md"
             )
         settings = gpiod.LineSettings(
             direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE

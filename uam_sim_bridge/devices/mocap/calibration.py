@@ -116,7 +116,7 @@ def text(calibration: Calibration) -> str:
         return f"[{', '.join(f'{value + 0.0:.{digits}f}' for value in values)}]"
 
     lines = [
-        "# Motion capture: tracker's axes and rigid body -> ENU and FLU; docs/mocap_hardware.md",
+        "# Motion capture: tracker's axes and rigid body -> ENU and FLU; docs/hardware.md",
         f"up: {c.up}  # axis of the tracker's world that points up",
         f"heading_deg: {math.degrees(c.heading):.6g}  # [deg] about up, tracker -> world",
         f"origin: {row(c.origin, 5)}  # [m, ENU] subtracted from positions",
