@@ -10,7 +10,7 @@
 The mission is the paper's, with a payload of 0.2 kg. The profile is paper_table1_as_flown; what it
 assumes and the other readings stand in table1_flights/assumptions.yaml. `deviations` flies s500
 with each change of deviations.yaml instead. Rows: root mean square over the seeds. Writes table1.md
-and a picture of the part flown to --out. docs/table1.md and docs/law.md have the tables.
+and a picture of the part flown to --out. docs/law.md has the tables of `flown` and `deviations`.
 """
 
 from __future__ import annotations

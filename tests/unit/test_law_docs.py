@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/law.md").read_text()
-PREFIXES = ("", "uam_control/")
+PREFIXES = ("", "uam_control/", "uam_lab/analysis/")
 CITED = re.compile(r"`((?:\w+/)*\w+\.py)(?:: (\w+))?`")
 
 

@@ -4,7 +4,7 @@ Thrust. The collective is the part of tau_p along the body's thrust axis, u1 = t
 clamped to [thrust_min, thrust_max] and mapped to 0..1 by the inverse of the thrust curve.
 
 With `throttle_per_newton` c the motor command is c ||tau_p|| instead, without a thrust curve: the
-convention of many laboratories, in which tau_p is an acceleration of a unit mass (docs/table1.md).
+convention of many laboratories, in which tau_p is an acceleration of a unit mass (docs/law.md).
 The bridge inverts only the autopilot's curve, as if THR_MDL_FAC were 0.
 
 Rates. PX4's rate loop makes the torque
