@@ -1,4 +1,4 @@
-"""What docs/endurance.md says of a busy machine: it costs latency and ticks, never the record.
+"""What docs/tick_budget.md says of a busy machine: it costs latency and ticks, never the record.
 
 How much latency depends on the machine: benchmarks/load.py measures it.
 """

@@ -155,7 +155,7 @@ class Command:
         self.option("--jobs", "N", text, type=count)
         text = (
             "Dask scheduler whose workers fly, as tcp://host:8786, in place of processes of this "
-            "machine: docs/many_flights.md"
+            "machine: docs/experiments.md"
         )
         self.option("--scheduler", "ADDRESS", text, "")
 
