@@ -3,7 +3,7 @@
     python examples/own_planner.py [FOLDER]
 
 The mission checks the trajectory against its limits before it replaces what is flown. The same
-message may come from any other process, on the topic base_trajectory (docs/planners.md).
+message may come from any other process, on the topic base_trajectory (docs/scenarios.md).
 """
 
 import math

@@ -2,7 +2,7 @@
 
     from uam_lab import Flight
 
-See docs/library.md.
+See docs/extending.md.
 """
 
 from __future__ import annotations

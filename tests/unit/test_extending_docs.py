@@ -15,7 +15,8 @@ from uam_sim_bridge.faults.fault import Occurrence
 from uam_sim_bridge.plant import Samples
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/extending.md").read_text()
-FAULT, SETPOINT = re.findall(r"^```python\n(.*?)^```$", TEXT, re.M | re.S)
+PARTS = TEXT.partition("## Parts of your own")[2]
+FAULT, SETPOINT = re.findall(r"^```python\n(.*?)^```$", PARTS, re.M | re.S)
 
 
 def test_the_fault_scales_the_gyroscope():

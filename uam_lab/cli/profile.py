@@ -20,7 +20,7 @@ examples:
   ros2 param dump /arm_controller > arm.yaml; uam profile s500 arm.yaml    a later file overrides
 
 Adapted gains, filters and the desired attitude stay unchanged; the outputs change because the new
-gains act on the same errors (docs/tuning_in_flight.md). The log records every change.
+gains act on the same errors (docs/tuning.md). The log records every change.
 """
 
 

@@ -311,7 +311,7 @@ class Flight:
     def plan(self, message: Any) -> str:
         """Fly a PoseStamped, or a MultiDOFJointTrajectory of the base, or a JointTrajectory.
 
-        Returns the mission's answer. Raises CommandRefused with its reason (docs/planners.md).
+        Returns the mission's answer. Raises CommandRefused with its reason (docs/scenarios.md).
         """
         return self._commands().plan(message)
 
