@@ -7,7 +7,9 @@ low-pass filtered; the corner frequencies are parameters.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +17,17 @@ from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
+    FilterArrays,
     PoseFilter,
     allowed_bandwidth,
+    begin_anew,
+    correct_at,
     parts_of,
     predict_next,
 )
+from uam_control.estimation.pose_gate import settled, suspend
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import record
 from uam_control.maths.rotations import (
     euler_from_quaternion,
     matrix_from_quaternion,
@@ -76,38 +83,58 @@ class EstimatorParameters(ParameterSet):
         ]
 
 
+class EstimatorArrays(NamedTuple):
+    """State of a `StateEstimator`: of its `PoseFilter`; memory: see `arrays_of`; numbers (1,): see
+    WHOLE, REAL."""
+
+    pose: FilterArrays
+    memory: np.ndarray
+    numbers: np.ndarray
+
+
+# started: whether a pose has come. Stamps of the newest samples [s], NaN before the first; period
+# [s]: of the newest IMU sample; then the parameters
+WHOLE = "started"
+REAL = (
+    "imu_stamp joint_stamp period "
+    "angular_cutoff linear_cutoff joint_bandwidth velocity_weight joint_cutoff bandwidth"
+)
+
+
 class StateEstimator:
     """Estimates chi, chi_dot, chi_ddot.
 
     Pass the samples in order of arrival by `mocap`, `imu` and `joints`; `update` returns the state
-    at the stamp of the newest IMU sample. `imu_update` is both, in less time.
+    at the stamp of the newest IMU sample. `imu_update` is both, in less time. `arrays`: the whole
+    state; they are never replaced.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
         """joints: how many the arm has."""
-        self.parameters = parameters
         p = parameters
         self._pose = PoseFilter(p.position_bandwidth, p.attitude_bandwidth, p.pose_gate, p.gravity)
-        self._memory = np.zeros(memory_size(joints))
-        self._state, self._joints, *_ = arrays_of(self._memory)
-        self._imu_stamp: float | None = None
-        self._joint_stamp: float | None = None
-        self._started = False
-        self._period = 0.0
-        pose, own, sample, angles = self._pose.memory, self._memory, np.zeros(3), np.zeros(joints)
-        self._follow_joints = prepared(follow_joints, own, angles, angles, 0.0, 0.0, 0.0, 0.0)
-        self._write_biases = prepared(write_biases, pose, np.empty((2, 3)))
-        self._assemble = prepared(assemble_stored, pose, own, 0.0, 0.0, 0.0)
-        self._predict_and_assemble = prepared(
-            predict_and_assemble, pose, own, 0, 0.0, 0.0, 0.0, sample, sample, 0.0, 0.0
-        )
+        self.memory = record(WHOLE, REAL)
+        self.arrays = EstimatorArrays(self._pose.arrays, np.zeros(memory_size(joints)), self.memory)
+        self.set_parameters(parameters)
+        forget_samples(self.arrays)
+        self._state, *_ = arrays_of(self.arrays.memory)
+        a, sample, angles = self.arrays, np.zeros(3), np.zeros(joints)
+        self._mocap = prepared(take_mocap, a, 0.0, sample, np.zeros(4))
+        self._imu = prepared(take_imu, a, 0.0, sample, sample)
+        self._joints = prepared(take_joints, a, 0.0, angles, angles)
+        self._write_biases = prepared(write_biases, a.pose.memory, np.empty((2, 3)))
+        self._assemble = prepared(assemble_stored, a)
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         """Use `parameters` (validated) from the next sample on."""
-        self.parameters = parameters
-        self._pose.set_bandwidths(parameters.position_bandwidth, parameters.attitude_bandwidth)
-        self._pose.gate.distance = parameters.pose_gate
-        self._pose.gravity = parameters.gravity
+        self.parameters = p = parameters
+        self._pose.set_bandwidths(p.position_bandwidth, p.attitude_bandwidth)
+        self._pose.gate.distance = p.pose_gate
+        self._pose.gravity = p.gravity
+        m = self.memory[0]
+        m.angular_cutoff, m.linear_cutoff = p.angular_acceleration_cutoff, p.acceleration_cutoff
+        m.joint_bandwidth, m.velocity_weight = p.joint_bandwidth, p.joint_velocity_weight
+        m.joint_cutoff, m.bandwidth = p.joint_acceleration_cutoff, p.position_bandwidth
 
     @property
     def refused_poses(self) -> int:
@@ -117,10 +144,11 @@ class StateEstimator:
     @property
     def waiting_for(self) -> list[str]:
         """Return the names of the inputs without any sample so far."""
+        m = self.memory[0]
         seen = {
-            "imu": self._imu_stamp is not None,
-            "mocap": self._started,
-            "joints": self._joint_stamp is not None,
+            "imu": not math.isnan(m.imu_stamp),
+            "mocap": m.started,
+            "joints": not math.isnan(m.joint_stamp),
         }
         return [name for name, received in seen.items() if not received]
 
@@ -131,98 +159,36 @@ class StateEstimator:
 
     @property
     def bias_known(self) -> bool:
-        """Whether neither a gap of IMU or poses nor noise covers the estimated biases."""
-        quiet = self.parameters.position_bandwidth <= QUIET_BANDWIDTH
-        return quiet and self._imu_stamp is not None and self._pose.gate.settled(self._imu_stamp)
+        """See `bias_known`."""
+        return bias_known(self.arrays)
 
     @property
     def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the estimated biases (3,) of gyroscope [rad/s] and accelerometer [m/s^2], FLU."""
         found = np.empty((2, 3))
-        self._write_biases(self._pose.memory, found)
+        self._write_biases(self.arrays.pose.memory, found)
         return found[0], found[1]
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Process a pose exposed at `stamp` [s].
-
-        position (3,) [m, world]; quaternion (4,) body → world [w x y z].
-        """
-        if not self._started:
-            self._pose.start(position, quaternion)
-            self._started = True
-        self._pose.correct(stamp, position, quaternion)
+        """See `take_mocap`."""
+        self._mocap(self.arrays, stamp, position, quaternion)
 
     def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
-        """Process an IMU sample at `stamp` [s].
-
-        gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
-        """
-        if self._take_imu(stamp):
-            self._pose.predict(stamp, self._period, gyro, specific_force)
-
-    def _take_imu(self, stamp: float) -> bool:
-        """Take the stamp [s] of an IMU sample; return whether the sample is to be integrated."""
-        last, self._imu_stamp = self._imu_stamp, stamp
-        if last is None:
-            self._period = 0.0
-            return False
-        step = stamp - last
-        if step > LONGEST_STEP:
-            self._pose.gate.suspend(stamp)
-            step = LONGEST_STEP
-        self._period = step if step > 0.0 else 0.0
-        return self._started and step > 0.0
+        """See `take_imu`."""
+        self._imu(self.arrays, stamp, gyro, specific_force)
 
     def imu_update(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> np.ndarray:
         """Process an IMU sample as `imu` does, and return the state as `update` does."""
-        p, pose, integrate = self.parameters, self._pose, self._take_imu(stamp)
-        if not integrate or pose.ahead:
-            if integrate:
-                pose.predict(stamp, self._period, gyro, specific_force)
-            return self.update()
-        self._predict_and_assemble(
-            pose.memory,
-            self._memory,
-            pose.next_row(),
-            stamp,
-            self._period,
-            pose.gravity,
-            gyro,
-            specific_force,
-            p.angular_acceleration_cutoff,
-            p.acceleration_cutoff,
-        )
-        return self._state
+        self.imu(stamp, gyro, specific_force)
+        return self.update()
 
     def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """Process joint readings at `stamp` [s]: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
-        p = self.parameters
-        last, self._joint_stamp = self._joint_stamp, stamp
-        if last is None:
-            self._joints[0] = alpha
-            self._joints[1] = alpha_dot
-            return
-        dt = min(max(stamp - last, 0.0), LONGEST_STEP)
-        self._follow_joints(
-            self._memory,
-            alpha,
-            alpha_dot,
-            p.joint_bandwidth,
-            p.joint_velocity_weight,
-            p.joint_acceleration_cutoff,
-            dt,
-        )
+        """See `take_joints`."""
+        self._joints(self.arrays, stamp, alpha, alpha_dot)
 
     def update(self) -> np.ndarray:
         """Return the state (3, 6 + n) at the newest IMU stamp; the next call reuses the array."""
-        p = self.parameters
-        self._assemble(
-            self._pose.memory,
-            self._memory,
-            self._period,
-            p.angular_acceleration_cutoff,
-            p.acceleration_cutoff,
-        )
+        self._assemble(self.arrays)
         return self._state
 
 
@@ -259,23 +225,80 @@ def arrays_of(
 
 
 @jit
-def follow_joints(
-    memory: np.ndarray,
-    alpha: np.ndarray,
-    alpha_dot: np.ndarray,
-    bandwidth: float,
-    velocity_weight: float,
-    acceleration_cutoff: float,
-    dt: float,
-) -> None:
-    """Advance the joints by dt [s] with readings alpha (n,) [rad], alpha_dot (n,) [rad/s].
+def forget_samples(a: EstimatorArrays) -> None:
+    """Begin anew; parameters stay."""
+    m = a.numbers[0]
+    m.started, m.period = 0, 0.0
+    m.imu_stamp = m.joint_stamp = math.nan
+    a.memory[:] = 0.0
+    begin_anew(a.pose)
 
-    memory: see `arrays_of`; bandwidth, velocity_weight: see `joint_step`; acceleration_cutoff [Hz]:
-    see `derivative_step`. Writes the accelerations into the state.
+
+@jit
+def take_mocap(
+    a: EstimatorArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray
+) -> None:
+    """Process a pose exposed at `stamp` [s].
+
+    position (3,) [m, world]; quaternion (4,) body → world [w x y z].
     """
-    state, joints, joints_filter, _, _ = arrays_of(memory)
-    joint_step(alpha, alpha_dot, bandwidth, velocity_weight, dt, joints)
-    derivative_step(joints[1], acceleration_cutoff, dt, joints_filter, state[CHI_DDOT, ALPHA:])
+    m = a.numbers[0]
+    if not m.started:
+        motion, _, _ = parts_of(a.pose.memory)
+        motion.position[:] = position
+        motion.quaternion[:] = quaternion
+        m.started = 1
+    correct_at(a.pose, stamp, position, quaternion)
+
+
+@jit
+def take_imu(
+    a: EstimatorArrays, stamp: float, gyro: np.ndarray, specific_force: np.ndarray
+) -> None:
+    """Process an IMU sample at `stamp` [s].
+
+    gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
+    """
+    m = a.numbers[0]
+    first, step = math.isnan(m.imu_stamp), stamp - m.imu_stamp
+    m.imu_stamp = stamp
+    if step > LONGEST_STEP:
+        suspend(a.pose.gate, stamp)
+        step = LONGEST_STEP
+    m.period = 0.0 if first or not step > 0.0 else step
+    if m.started and m.period > 0.0:
+        predict_next(a.pose, stamp, m.period, gyro, specific_force)
+
+
+@jit
+def take_joints(a: EstimatorArrays, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
+    """Process joint readings at `stamp` [s]: alpha (n,) [rad], alpha_dot (n,) [rad/s].
+
+    Writes the accelerations into the state.
+    """
+    m = a.numbers[0]
+    first, dt = math.isnan(m.joint_stamp), min(max(stamp - m.joint_stamp, 0.0), LONGEST_STEP)
+    m.joint_stamp = stamp
+    state, joints, joints_filter, _, _ = arrays_of(a.memory)
+    if first:
+        joints[0], joints[1] = alpha, alpha_dot
+        return
+    joint_step(alpha, alpha_dot, m.joint_bandwidth, m.velocity_weight, dt, joints)
+    derivative_step(joints[1], m.joint_cutoff, dt, joints_filter, state[CHI_DDOT, ALPHA:])
+
+
+@jit
+def complete(a: EstimatorArrays) -> bool:
+    """Return whether every input has delivered a sample."""
+    m = a.numbers[0]
+    return m.started != 0 and not (math.isnan(m.imu_stamp) or math.isnan(m.joint_stamp))
+
+
+@jit
+def bias_known(a: EstimatorArrays) -> bool:
+    """Return whether neither a gap of IMU or poses nor noise covers the estimated biases."""
+    m = a.numbers[0]
+    return m.bandwidth <= QUIET_BANDWIDTH and settled(a.pose.gate, m.imu_stamp)
 
 
 @jit
@@ -287,32 +310,14 @@ def write_biases(pose: np.ndarray, found: np.ndarray) -> None:
 
 
 @jit
-def predict_and_assemble(
-    pose: np.ndarray,
-    memory: np.ndarray,
-    row: int,
-    stamp: float,
-    period: float,
-    gravity: float,
-    gyro: np.ndarray,
-    specific_force: np.ndarray,
-    angular_cutoff: float,
-    linear_cutoff: float,
-) -> None:
-    """Integrate an IMU sample, see `predict_next`, and write the state, see `assemble_stored`."""
-    predict_next(pose, row, stamp, period, gravity, gyro, specific_force)
-    assemble_stored(pose, memory, period, angular_cutoff, linear_cutoff)
-
-
-@jit
-def assemble_stored(
-    pose: np.ndarray, memory: np.ndarray, period: float, angular_cutoff: float, linear_cutoff: float
-) -> None:
-    """Write the state into memory, see `arrays_of` and `assemble`; pose: see `parts_of`."""
-    motion, _, _ = parts_of(pose)
-    state, joints, _, rates_filter, acceleration = arrays_of(memory)
+def assemble_stored(a: EstimatorArrays) -> None:
+    """Write the state into memory, see `arrays_of` and `assemble`."""
+    m = a.numbers[0]
+    motion, _, _ = parts_of(a.pose.memory)
+    state, joints, _, rates_filter, acceleration = arrays_of(a.memory)
     assemble(
-        motion, joints, period, angular_cutoff, linear_cutoff, rates_filter, acceleration, state
+        *(motion, joints, m.period, m.angular_cutoff, m.linear_cutoff),
+        *(rates_filter, acceleration, state),
     )
 
 

@@ -1,35 +1,74 @@
-"""Detection of a clock of the poses that has jumped back: their stamps then say too great an age.
+"""Detection of a clock of the poses that has jumped: their stamps then say a wrong age.
 
 A late pose has a right stamp, and stamps never go back. Poses whose clock is behind would be
 compared with an estimate of too early a time: the estimate leads, and the position loop swings up.
+Poses that are ahead while samples keep coming would count late.
 """
 
 from __future__ import annotations
 
 import math
 
-from uam_control.ages import AHEAD, usable
+import numpy as np
+
+from uam_control.ages import AHEAD, AHEAD_FOR, usable
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
+
+# newest [s]: stamp of the newest pose that counted, age [s]: of that at its arrival; ahead_since
+# [s]: stamp of the estimate from which on a pose far ahead waits at any time
+WHOLE, REAL = "behind ahead", "newest age ahead_since"
 
 
 class PoseClock:
     """Decides for each pose, in order of arrival, whether its stamp counts."""
 
     def __init__(self) -> None:
-        self._newest = -math.inf  # [s] stamp of the newest pose that counted
-        self._age = math.inf  # [s] of that pose at its arrival
-        self._behind = False
+        self.memory = record(WHOLE, REAL)
+        forget_clock(self.memory)
 
     def __call__(self, stamp: float, now: float, oldest: float) -> bool:
-        """Return whether a pose of `stamp` [s] counts at `now` [s].
+        """See `counts`."""
+        return counts(self.memory, stamp, now, oldest)
 
-        It is `usable` up to an age of `oldest` [s]. After stamps that went back no pose counts
-        until one is about as young as the last that did.
-        """
-        age = now - stamp
-        if not usable(age, oldest):
-            return False
-        self._behind = self._behind or stamp < self._newest - AHEAD
-        if self._behind and age > self._age + AHEAD:
-            return False
-        self._newest, self._age, self._behind = stamp, age, False
-        return True
+
+@borrowing
+def forget_clock(clock: np.ndarray) -> None:
+    """Know no pose; clock (1,): memory of a `PoseClock`."""
+    m = clock[0]
+    m.behind = m.ahead = False
+    m.newest = -math.inf
+    m.age = m.ahead_since = math.inf
+
+
+@borrowing
+def counts(clock: np.ndarray, stamp: float, now: float, oldest: float) -> bool:
+    """Return whether a pose of `stamp` [s] counts at `now` [s]; clock: see `forget_clock`.
+
+    It is `usable` up to an age of `oldest` [s]. After stamps that went back no pose counts
+    until one is about as young as the last that did.
+    """
+    m, age = clock[0], now - stamp
+    if not usable(age, oldest):
+        return False
+    if stamp < m.newest - AHEAD:
+        m.behind = True
+    if m.behind and age > m.age + AHEAD:
+        return False
+    m.newest, m.age, m.behind = stamp, age, False
+    return True
+
+
+@borrowing
+def waits(clock: np.ndarray, stamp: float, newest: float, waiting: bool) -> bool:
+    """Return whether a pose of `stamp` [s] waits for its IMU sample, newer than `newest` [s].
+
+    waiting: whether others do.
+    """
+    m = clock[0]
+    if stamp - newest <= AHEAD:
+        m.ahead, m.ahead_since = False, math.inf
+    elif not m.ahead:
+        m.ahead_since = min(m.ahead_since, newest) if waiting else newest
+        m.ahead = newest - m.ahead_since > AHEAD_FOR
+    return not m.ahead

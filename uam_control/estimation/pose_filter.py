@@ -8,19 +8,18 @@ between two samples of the IMU, too. One that arrives before the IMU's sample wa
 from __future__ import annotations
 
 import math
-from bisect import insort
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.ages import AHEAD, AHEAD_FOR, BRIDGED
+from uam_control.ages import BRIDGED
 from uam_control.coordinates import Z
 from uam_control.estimation.history import OLDEST_MATCH, value_at
-from uam_control.estimation.pose_clock import PoseClock
-from uam_control.estimation.pose_gate import PoseGate
-from uam_control.estimation.repeats import Repeats
+from uam_control.estimation.pose_clock import PoseClock, counts, forget_clock, waits
+from uam_control.estimation.pose_gate import PoseGate, forget_rejections, rejects
+from uam_control.estimation.repeats import Repeats, repeated
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -82,46 +81,72 @@ def allowed_bandwidth(interval: float) -> float:
     return LARGEST_GAIN / interval
 
 
+class FilterArrays(NamedTuple):
+    """State of a `PoseFilter`: memory, see `parts_of`; bandwidths (3,) [rad/s]: of the corrections
+    of position and attitude, and the larger of both; used (2,) [rad/s]: in this correction; ahead
+    (HISTORY, 8): stamp and pose of those that wait for their IMU sample, in order; newest (7,): see
+    `Repeats`; clock, gate (1,): memories; numbers (1,): see WHOLE, REAL."""
+
+    memory: np.ndarray
+    bandwidths: np.ndarray
+    used: np.ndarray
+    ahead: np.ndarray
+    newest: np.ndarray
+    clock: np.ndarray
+    gate: np.ndarray
+    numbers: np.ndarray
+
+
+# count: of the IMU samples; waiting: number of poses ahead. Stamps [s], NaN before the first:
+# last_correction: of the pose; compared: of the last prediction compared with a pose
+WHOLE, REAL = "count waiting", "last_correction compared gravity"
+
+
 class PoseFilter:
     """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
 
     position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
     rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
     bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]. `motion`: all of
-    them; `memory`: see `parts_of`. The arrays are never replaced.
-    `ahead`: poses that wait for their IMU sample.
+    them; `arrays`: the whole state. The arrays are never replaced.
     """
+
+    gravity = Number()
 
     def __init__(
         self, position_bandwidth: float, attitude_bandwidth: float, gate: float, gravity: float
     ) -> None:
         """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`;
         gravity [m/s^2]."""
+        self.gate, self.memory = PoseGate(gate), record(WHOLE, REAL)
         self.gravity = gravity
-        self.gate = PoseGate(gate)
+        self.arrays = FilterArrays(
+            np.zeros(MEMORY),
+            np.zeros(3),
+            np.zeros(2),
+            np.zeros((HISTORY, 1 + POSE)),
+            Repeats().newest,
+            PoseClock().memory,
+            self.gate.memory,
+            self.memory,
+        )
         self.set_bandwidths(position_bandwidth, attitude_bandwidth)
-        self.memory = np.zeros(MEMORY)
-        self.motion, self._stamps, self._poses = parts_of(self.memory)
+        begin_anew(self.arrays)
+        self.motion, _, _ = parts_of(self.arrays.memory)
         self.position, self.velocity, self.quaternion, self.rates = self.motion[:4]
         self.acceleration, self.gyro_bias, self.accelerometer_bias = self.motion[4:]
-        self.quaternion[0] = 1.0
-        self._stamps[:] = -math.inf
-        self._count = 0
-        self._last_correction: float | None = None  # stamp [s]
-        self._compared = math.nan  # stamp [s] of the last prediction compared with a pose
-        self._ahead_since = math.inf  # stamp [s] from which on a pose far ahead waits at any time
-        self._clock_ahead = False  # whether the clock of the poses is wrong
-        self.ahead: list[tuple[float, np.ndarray, np.ndarray]] = []  # in order of the stamps
-        self._clock, self._repeats = PoseClock(), Repeats()
-        memory, still = self.memory, np.zeros(3)
-        self._predict = prepared(predict_next, memory, 0, 0.0, 0.0, 0.0, still, still)
-        self._match = prepared(match_stored, memory, 0, 0.0, still)
-        self._correct = prepared(correct_stored, memory, 0.0, self._bandwidths, still, np.zeros(4))
+        still = np.zeros(3)
+        self._predict = prepared(predict_next, self.arrays, 0.0, 0.0, still, still)
+        self._correct = prepared(correct_at, self.arrays, 0.0, still, np.zeros(4))
+
+    @property
+    def ahead(self) -> list[list[float]]:
+        """Return stamp [s] and pose (7) of each that waits for its IMU sample, in order."""
+        return self.arrays.ahead[: self.memory["waiting"].item()].tolist()
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
-        self._bandwidths = np.array([position, attitude], dtype=float)
-        self._widest = max(position, attitude)
+        self.arrays.bandwidths[:] = position, attitude, max(position, attitude)
 
     def start(self, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Begin at rest at a measured pose: position (3,) [m, world], quaternion (4,) [w x y z]."""
@@ -131,137 +156,154 @@ class PoseFilter:
     def predict(
         self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
     ) -> None:
-        """Integrate an IMU sample over dt [s].
-
-        stamp [s]: of the sample; gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
-        """
-        row = self.next_row()
-        self._predict(self.memory, row, stamp, dt, self.gravity, gyro, specific_force)
-        while self.ahead and self.ahead[0][0] <= stamp:
-            self.correct(*self.ahead.pop(0))
-
-    def next_row(self) -> int:
-        """Return the row of the stored predictions for the next IMU sample."""
-        row = self._count % HISTORY
-        self._count += 1
-        return row
+        """See `predict_next`."""
+        self._predict(self.arrays, stamp, dt, gyro, specific_force)
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Correct with a pose exposed at `stamp` [s].
+        """See `correct_at`."""
+        self._correct(self.arrays, stamp, position, quaternion)
 
-        position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
-        older than the stored predictions, has a wrong clock (`PoseClock`), repeats the last pose
-        exactly (`Repeats`), or has jumped away from the estimate (`PoseGate`). One that is newer
-        than the newest prediction waits for the IMU. A stored prediction is compared with one pose:
-        beside a gap of the IMU the same difference would count several times.
-        """
-        newest = (self._count - 1) % HISTORY
-        last = self._stamps[newest]
-        if stamp > last:
-            if self._count and self._waits(stamp, last):
-                if len(self.ahead) == HISTORY:
-                    del self.ahead[0]
-                insort(self.ahead, (stamp, position.copy(), quaternion.copy()), key=itemgetter(0))
-            return
-        compared, gap, jump, bias = self._match(self.memory, newest, stamp, position)
-        if not self._clock(stamp, last, BRIDGED):
-            self.gate.refused += 1
-            return
-        if abs(stamp - compared) > OLDEST_MATCH:
-            return
-        if self._repeats(position, quaternion) or compared == self._compared:
-            return
-        if self.gate(stamp, jump, bias):
-            return
-        bandwidths, dt = self._bandwidths, FIRST
-        step = max(gap, LATE_SHARE * (last - compared))
-        if self._last_correction is not None:
-            dt = max(stamp - self._last_correction, 1e-3)
-            step = max(dt, step)
-        if step * self._widest > LARGEST_GAIN:
-            bandwidths = np.minimum(bandwidths, allowed_bandwidth(step))
-        self._last_correction, self._compared = stamp, compared
-        since = last - compared
-        if since > LATE:
-            before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
-        self._correct(self.memory, dt, bandwidths, position, quaternion)
-        if since > LATE:
-            self.position += since * (self.velocity - before[1])
-            shift(
-                self._stamps,
-                self._poses,
-                compared,
-                self.position - before[0],
-                self.velocity - before[1],
-                quaternion_multiply(before[2] * CONJUGATE, self.quaternion),
-            )
 
-    def _waits(self, stamp: float, newest: float) -> bool:
-        """Whether a pose of `stamp` waits for its IMU sample, newer than `newest` [s].
-
-        Poses that are ahead while samples keep coming have a wrong clock: they would count late.
-        """
-        if stamp - newest <= AHEAD:
-            self._clock_ahead, self._ahead_since = False, math.inf
-        elif not self._clock_ahead:
-            self._ahead_since = min(self._ahead_since, newest) if self.ahead else newest
-            self._clock_ahead = newest - self._ahead_since > AHEAD_FOR
-            if self._clock_ahead:
-                self.ahead.clear()
-        self.gate.refused += self._clock_ahead
-        return not self._clock_ahead
+@jit
+def begin_anew(a: FilterArrays) -> None:
+    """Forget all samples: level and at rest; parameters stay."""
+    m = a.numbers[0]
+    motion, stamps, _ = parts_of(a.memory)
+    m.count = m.waiting = 0
+    m.last_correction = m.compared = math.nan
+    a.memory[:] = 0.0
+    motion.quaternion[0] = 1.0
+    stamps[:] = -math.inf
+    a.newest[:] = math.nan
+    forget_clock(a.clock)
+    forget_rejections(a.gate)
 
 
 @jit
 def predict_next(
-    memory: np.ndarray,
-    row: int,
-    stamp: float,
-    dt: float,
-    gravity: float,
-    gyro: np.ndarray,
-    specific_force: np.ndarray,
+    a: FilterArrays, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
 ) -> None:
-    """Integrate the IMU sample of `stamp` [s] in memory (MEMORY,), with its prediction in `row`.
+    """Integrate an IMU sample over dt [s]; then correct with the poses that waited for it.
 
-    The other arguments: see `predict`.
+    stamp [s]: of the sample; gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
     """
-    motion, stamps, poses = parts_of(memory)
+    m = a.numbers[0]
+    row = m.count % HISTORY
+    m.count += 1
+    motion, stamps, poses = parts_of(a.memory)
     stamps[row] = stamp
-    predict(dt, gravity, gyro, specific_force, motion, poses, row)
+    predict(dt, m.gravity, gyro, specific_force, motion, poses, row)
+    while m.waiting and a.ahead[0, 0] <= stamp:
+        at, pose = a.ahead[0, 0], a.ahead[0, 1:].copy()
+        drop_first(a)
+        correct_stored(a, at, pose[:TURN], pose[TURN:])
 
 
 @jit
-def match_stored(
-    memory: np.ndarray, newest: int, stamp: float, position: np.ndarray
-) -> tuple[float, float, float, float]:
-    """Find the prediction of `stamp` [s] in memory (MEMORY,) for `correct_stored`.
+def correct_at(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Correct with a pose exposed at `stamp` [s].
 
-    newest: row of the newest prediction; position (3,) [m, world]: of the measured pose. Returns
-    what `value_at` returns, the distance of the pose from the prediction [m], and the norm of the
-    accelerometer bias [m/s^2].
+    position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
+    older than the stored predictions, has a wrong clock (`PoseClock`), repeats the last pose
+    exactly (`Repeats`), or has jumped away from the estimate (`PoseGate`). One that is newer
+    than the newest prediction waits for the IMU. A stored prediction is compared with one pose:
+    beside a gap of the IMU the same difference would count several times.
     """
-    motion, stamps, poses = parts_of(memory)
-    predicted = memory[-POSE:]
-    compared, gap = value_at(stamps, poses, newest, stamp, predicted)
-    jump = bias = 0.0
-    for i in range(3):
-        jump += (position[i] - predicted[i]) ** 2
-        bias += motion.accelerometer_bias[i] ** 2
-    return compared, gap, math.sqrt(jump), math.sqrt(bias)
+    m = a.numbers[0]
+    last = parts_of(a.memory)[1][(m.count - 1) % HISTORY]
+    if not stamp > last:
+        correct_stored(a, stamp, position, quaternion)
+    elif m.count:
+        wait(a, stamp, last, position, quaternion)
+
+
+@jit
+def wait(
+    a: FilterArrays, stamp: float, newest: float, position: np.ndarray, quaternion: np.ndarray
+) -> None:
+    """Let a pose of `stamp` [s] wait for its IMU sample, newer than `newest` [s], if it counts."""
+    m = a.numbers[0]
+    if not waits(a.clock, stamp, newest, m.waiting > 0):
+        m.waiting = 0
+        a.gate[0].refused += 1
+        return
+    if m.waiting == HISTORY:
+        drop_first(a)
+    place = m.waiting
+    while place and a.ahead[place - 1, 0] > stamp:
+        a.ahead[place] = a.ahead[place - 1]
+        place -= 1
+    a.ahead[place, 0] = stamp
+    a.ahead[place, 1 : 1 + TURN] = position
+    a.ahead[place, 1 + TURN :] = quaternion
+    m.waiting += 1
+
+
+@jit
+def drop_first(a: FilterArrays) -> None:
+    """Forget the oldest pose that waits."""
+    m = a.numbers[0]
+    m.waiting -= 1
+    for i in range(m.waiting):
+        a.ahead[i] = a.ahead[i + 1]
 
 
 @jit
 def correct_stored(
-    memory: np.ndarray,
-    dt: float,
-    bandwidths: np.ndarray,
-    position: np.ndarray,
-    quaternion: np.ndarray,
+    a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray
 ) -> None:
-    """Correct memory (MEMORY,) with a pose and the prediction of `match_stored`, see `correct`."""
-    motion, _, _ = parts_of(memory)
-    correct(dt, bandwidths, position, quaternion, memory[-POSE:], motion)
+    """Correct with a pose that has its prediction, see `correct_at`."""
+    m = a.numbers[0]
+    motion, stamps, poses = parts_of(a.memory)
+    newest, predicted = (m.count - 1) % HISTORY, a.memory[-POSE:]
+    last = stamps[newest]
+    compared, gap = value_at(stamps, poses, newest, stamp, predicted)
+    if not counts(a.clock, stamp, last, BRIDGED):
+        a.gate[0].refused += 1
+        return
+    if abs(stamp - compared) > OLDEST_MATCH:
+        return
+    if repeated(position, quaternion, a.newest) or compared == m.compared:
+        return
+    jump = bias = 0.0
+    for i in range(3):
+        jump += (position[i] - predicted[i]) ** 2
+        bias += motion.accelerometer_bias[i] ** 2
+    if rejects(a.gate, stamp, math.sqrt(jump), math.sqrt(bias)):
+        return
+    since, dt = last - compared, FIRST
+    step = max(gap, LATE_SHARE * since)
+    if not math.isnan(m.last_correction):
+        dt = max(stamp - m.last_correction, 1e-3)
+        step = max(dt, step)
+    capped = step * a.bandwidths[2] > LARGEST_GAIN
+    for i in range(2):
+        a.used[i] = min(a.bandwidths[i], LARGEST_GAIN / step) if capped else a.bandwidths[i]
+    m.last_correction, m.compared = stamp, compared
+    if since > LATE:
+        correct_late(a, since, dt, position, quaternion)
+    else:
+        correct(dt, a.used, position, quaternion, predicted, motion)
+
+
+@jit
+def correct_late(
+    a: FilterArrays, since: float, dt: float, position: np.ndarray, quaternion: np.ndarray
+) -> None:
+    """Correct as `correct` does, and what was predicted in the `since` [s] after the exposure."""
+    motion, stamps, poses = parts_of(a.memory)
+    place, speed, turn = motion.position.copy(), motion.velocity.copy(), motion.quaternion.copy()
+    correct(dt, a.used, position, quaternion, a.memory[-POSE:], motion)
+    for i in range(3):
+        motion.position[i] += since * (motion.velocity[i] - speed[i])
+    shift(
+        stamps,
+        poses,
+        a.numbers[0].compared,
+        motion.position - place,
+        motion.velocity - speed,
+        quaternion_multiply(turn * CONJUGATE, motion.quaternion),
+    )
 
 
 @jit

@@ -10,53 +10,90 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from uam_control.ages import REJECTED, UNAIDED
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import Number, record
 
 CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
 MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
+# stamps [s]; rejecting_since: NaN while no pose is rejected
+REAL = "distance suspended last interrupted rejecting_since"
 
 
 class PoseGate:
     """Decides for each pose whether to reject it; `refused`: number of rejected poses."""
 
+    refused, distance = Number(), Number()
+
     def __init__(self, distance: float) -> None:
         """distance [m]: from the estimate, above which a pose is rejected."""
+        self.memory = record("refused", REAL)
         self.distance = distance
-        self.refused = 0
-        self._suspended = self._last = self._interrupted = -math.inf  # stamps [s]
-        self._rejecting_since: float | None = None
+        forget_rejections(self.memory)
 
     def __call__(self, stamp: float, distance: float, bias: float) -> bool:
-        """Return whether to reject the pose at `stamp` [s].
-
-        distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
-        estimated accelerometer bias.
-        """
-        if stamp - self._last > UNAIDED:
-            self.suspend(stamp)
-        elif self._rejecting_since is None and bias > CONTRADICTED:
-            self._suspended = stamp
-        self._last = stamp
-        trusted = stamp - self._suspended > MEMORY
-        if not (distance > self.distance and trusted):
-            self._rejecting_since = None
-            return False
-        if self._rejecting_since is None:
-            self._rejecting_since = stamp
-        if stamp - self._rejecting_since > REJECTED:
-            self._rejecting_since = None
-            self.suspend(stamp)
-            return False
-        self.refused += 1
-        return True
+        """See `rejects`."""
+        return rejects(self.memory, stamp, distance, bias)
 
     def suspend(self, stamp: float) -> None:
-        """Reject no pose for MEMORY from `stamp` [s] on: the estimate may have a large error."""
-        self._suspended = self._interrupted = stamp
+        """See `suspend`."""
+        suspend(self.memory, stamp)
 
     def settled(self, stamp: float) -> bool:
-        """Return whether the estimate at `stamp` [s] has recovered from the last interruption.
+        """See `settled`."""
+        return settled(self.memory, stamp)
 
-        Until then the estimated biases change fast, by the return of the poses alone.
-        """
-        return stamp - self._interrupted > MEMORY
+
+@borrowing
+def forget_rejections(gate: np.ndarray) -> None:
+    """Begin anew; gate (1,): memory of a `PoseGate`."""
+    m = gate[0]
+    m.refused = 0
+    m.suspended = m.last = m.interrupted = -math.inf
+    m.rejecting_since = math.nan
+
+
+@borrowing
+def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float) -> bool:
+    """Return whether to reject the pose at `stamp` [s]; gate: see
+    `forget_rejections`.
+
+    distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
+    estimated accelerometer bias.
+    """
+    m = gate[0]
+    if stamp - m.last > UNAIDED:
+        suspend(gate, stamp)
+    elif math.isnan(m.rejecting_since) and bias > CONTRADICTED:
+        m.suspended = stamp
+    m.last = stamp
+    trusted = stamp - m.suspended > MEMORY
+    if not (distance > m.distance and trusted):
+        m.rejecting_since = math.nan
+        return False
+    if math.isnan(m.rejecting_since):
+        m.rejecting_since = stamp
+    if stamp - m.rejecting_since > REJECTED:
+        m.rejecting_since = math.nan
+        suspend(gate, stamp)
+        return False
+    m.refused += 1
+    return True
+
+
+@borrowing
+def suspend(gate: np.ndarray, stamp: float) -> None:
+    """Reject no pose for MEMORY from `stamp` [s] on: the estimate may have a large error."""
+    m = gate[0]
+    m.suspended = m.interrupted = stamp
+
+
+@borrowing
+def settled(gate: np.ndarray, stamp: float) -> bool:
+    """Return whether the estimate at `stamp` [s] has recovered from the last interruption.
+
+    Until then the estimated biases change fast, by the return of the poses alone.
+    """
+    return stamp - gate[0].interrupted > MEMORY

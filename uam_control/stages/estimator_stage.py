@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, CHI_DDOT
+from uam_control.coordinates import CHI_DDOT
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.maths.compiled import jit, prepared
-from uam_control.stages.tick_stamps import TickStamps
+from uam_control.estimation.estimator import (
+    EstimatorArrays,
+    arrays_of,
+    assemble_stored,
+    bias_known,
+    complete,
+    forget_samples,
+    take_imu,
+    take_joints,
+    take_mocap,
+)
+from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.memory import Known, Number, record
+from uam_control.stages.tick_stamps import TickStamps, follows, next_stamp
 from uam_control.stamps import SECOND
 
 MEMORY = 100  # poses
@@ -17,6 +30,7 @@ HELD_BACK = 1_000_000_000  # [ns] without a state after the estimate has diverge
 # [m, rad, m/s, rad/s] largest believable entry of chi and chi_dot; no vehicle of a room reaches it
 BELIEVABLE = 1e3
 BIAS_PERIOD = 20_000_000  # [ns] between two publications of the estimated biases
+STATE, NONE, OLDER = range(3)  # what a tick gives; OLDER: its stamp does not follow
 
 
 class PoseAge:
@@ -25,26 +39,47 @@ class PoseAge:
     `mean` [ns]: low-pass over MEMORY poses, None before the first; `largest` [ns]: since `restart`.
     """
 
+    mean, largest = Known(), Number()
+
     def __init__(self) -> None:
-        self.mean: float | None = None
-        self.largest = 0
-        self._arrived: int | None = None
+        # arrived [ns]: stamp of a pose that has come since the last tick, -1: none
+        self.memory = record("arrived largest", "mean")
+        self.memory[0] = -1, 0, math.nan
 
     def pose(self, exposed: int) -> None:
         """Take the stamp [ns] of a pose that has arrived."""
-        self._arrived = exposed
+        self.memory["arrived"] = exposed
 
     def tick(self, stamp: int) -> None:
-        """Take the stamp [ns] of a tick."""
-        if self._arrived is None:
-            return
-        age, self._arrived = stamp - self._arrived, None
-        self.mean = age if self.mean is None else self.mean + (age - self.mean) / MEMORY
-        self.largest = max(self.largest, age)
+        """See `age_at`."""
+        age_at(self.memory, stamp)
 
     def restart(self) -> None:
         """Begin a new period of `largest`."""
         self.largest = 0
+
+
+@borrowing
+def age_at(age: np.ndarray, stamp: int) -> None:
+    """Take the stamp [ns] of a tick; age (1,): memory of a `PoseAge`."""
+    m = age[0]
+    if m.arrived < 0:
+        return
+    now = stamp - m.arrived
+    m.arrived = -1
+    m.mean = now if math.isnan(m.mean) else m.mean + (now - m.mean) / MEMORY
+    m.largest = max(m.largest, now)
+
+
+class StageArrays(NamedTuple):
+    """State of an `EstimatorStage`: of its estimator, its ticks with their window, and the age of
+    its poses; numbers (1,): waiting: for the first sample of an input; see the stage."""
+
+    estimator: EstimatorArrays
+    ticks: np.ndarray
+    window: np.ndarray
+    age: np.ndarray
+    numbers: np.ndarray
 
 
 class EstimatorStage:
@@ -53,20 +88,31 @@ class EstimatorStage:
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
     `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
-    `StateEstimator.bias_known`; `diverged`: how often the estimate has, which then begins anew.
+    `StateEstimator.bias_known`; `diverged`: how often the estimate has, which then begins anew;
+    `held_until` [ns]: without states since then; `arrays`: the whole state, never replaced.
     """
+
+    bias_due, diverged, held_until = Number(), Number(), Number()
 
     def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
         """joints: number of joints of the arm; period [s]: of the control ticks."""
         self.estimator = StateEstimator(parameters, joints)
-        self._joint_count = joints
-        self.diverged = 0
-        self._held_until = 0  # [ns]
         self.ticks = TickStamps(round(period * SECOND))
         self.pose_age = PoseAge()
-        self.bias_due = False
-        self._believable = prepared(believable, np.zeros((3, ALPHA + joints)))
-        self._waiting = True  # for the first sample of an input
+        self.memory = record("bias_due diverged held_until waiting")
+        self.memory["waiting"] = True
+        self.arrays = a = StageArrays(
+            self.estimator.arrays,
+            self.ticks.memory,
+            self.ticks.window,
+            self.pose_age.memory,
+            self.memory,
+        )
+        self._state, *_ = arrays_of(a.estimator.memory)
+        sample, angles = np.zeros(3), np.zeros(joints)
+        self._pose = prepared(take_pose, a, 0, sample, np.zeros(4))
+        self._readings = prepared(take_readings, a, 0, angles, angles)
+        self._sample = prepared(take_sample, a, 0, sample, sample)
 
     @property
     def stamp(self) -> int:
@@ -76,58 +122,73 @@ class EstimatorStage:
     @property
     def held_back(self) -> bool:
         """Return whether no states come because the estimate has diverged."""
-        return self.diverged > 0 and self.stamp < self._held_until
+        return self.diverged > 0 and self.stamp < self.held_until
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         """Use `parameters` (validated) from the next sample on."""
         self.estimator.set_parameters(parameters)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
-        self.pose_age.pose(stamp)
-        self.estimator.mocap(stamp / SECOND, position, quaternion)
+        """See `take_pose`."""
+        self._pose(self.arrays, stamp, position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
-        self.estimator.joints(stamp / SECOND, alpha, alpha_dot)
+        """See `take_readings`."""
+        self._readings(self.arrays, stamp, alpha, alpha_dot)
 
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
-        """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
+        """Take an IMU sample: see `take_sample`.
 
         Returns the state (3, 6 + n) of the tick `stamp`, see `coordinates`; the next call reuses
-        the array. Returns None until every input has arrived once, for a repeated sample, and for
-        HELD_BACK after a state that is not finite or not believable: whoever flies by the state
-        then reacts as to an estimator that is gone.
-        Raises ValueError if the stamp is older than the last one.
+        the array. Raises ValueError if the stamp is older than the last one.
         """
-        estimator, ticks = self.estimator, self.ticks
-        before = ticks.repeated
-        if not ticks.follows(stamp):
-            if ticks.repeated > before:
-                return None
+        found = self._sample(self.arrays, stamp, gyro, force)
+        if found == OLDER:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
-        last, tick = ticks.stamp, ticks.next(stamp)
-        self.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and estimator.bias_known
-        self.pose_age.tick(tick)
-        if not self._waiting:
-            state = estimator.imu_update(tick / SECOND, gyro, force)
-        else:
-            estimator.imu(tick / SECOND, gyro, force)
-            self._waiting = bool(estimator.waiting_for)
-            if self._waiting:
-                return None
-            state = estimator.update()
-        if not self._believable(state):
-            self.diverge(tick)
-            return None
-        return None if tick < self._held_until else state
+        return self._state if found == STATE else None
 
-    def diverge(self, tick: int) -> None:
-        """Begin the estimate anew: that of the tick `tick` [ns] is not believable."""
-        self.diverged += 1
-        self._held_until = tick + HELD_BACK
-        self.estimator = StateEstimator(self.estimator.parameters, self._joint_count)
-        self._waiting = True
+
+@borrowing
+def take_pose(a: StageArrays, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
+    a.age[0].arrived = stamp
+    take_mocap(a.estimator, stamp / SECOND, position, quaternion)
+
+
+@borrowing
+def take_readings(a: StageArrays, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
+    """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
+    take_joints(a.estimator, stamp / SECOND, alpha, alpha_dot)
+
+
+@borrowing
+def take_sample(a: StageArrays, stamp: int, gyro: np.ndarray, force: np.ndarray) -> int:
+    """Take an IMU sample, which starts a tick: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
+
+    Returns STATE; OLDER; or NONE until every input has arrived once, for a repeated sample, and for
+    HELD_BACK after a state that is not finite or not believable: whoever flies by the state
+    then reacts as to an estimator that is gone.
+    """
+    m, ticks = a.numbers[0], a.ticks[0]
+    before, last = ticks.repeated, ticks.stamp
+    if not follows(a.ticks, stamp):
+        return NONE if ticks.repeated > before else OLDER
+    tick = next_stamp(a.ticks, a.window, stamp)
+    m.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and bias_known(a.estimator)
+    age_at(a.age, tick)
+    take_imu(a.estimator, tick / SECOND, gyro, force)
+    if m.waiting:
+        m.waiting = not complete(a.estimator)
+        if m.waiting:
+            return NONE
+    assemble_stored(a.estimator)
+    if not believable(arrays_of(a.estimator.memory)[0]):
+        m.diverged += 1
+        m.held_until = tick + HELD_BACK
+        m.waiting = True
+        forget_samples(a.estimator)
+        return NONE
+    return NONE if tick < m.held_until else STATE
 
 
 @jit

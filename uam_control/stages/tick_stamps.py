@@ -11,7 +11,10 @@ The stamps of a simulated IMU are exact multiples of the period and are not chan
 
 from __future__ import annotations
 
-from collections import deque
+import numpy as np
+
+from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.memory import Number, record
 
 MISSING = 0.75  # [periods] of delay from which the sample before is counted as missing
 GAIN = 0.02  # of the low-pass on the difference: 50 samples
@@ -19,53 +22,78 @@ SHIFT = 0.2  # [periods] of mean difference from which the ticks are shifted
 LONG = 10  # [periods] without a sample after which the ticks begin anew
 WINDOW = 100  # samples over which the IMU's period is measured
 OTHER_RATE = 0.1  # relative difference of the measured period from which stamps are not changed
+# sample: stamp [ns] of the newest one; kept: how many were kept in the window; difference [ns]:
+# mean of sample - tick
+WHOLE, REAL = "period stamp sample repeated missing kept", "difference"
 
 
 class TickStamps:
-    """The stamp of the newest tick, and numbers of repeated and missing samples."""
+    """The stamp [ns] of the newest tick, and numbers of repeated and missing samples.
+
+    window (WINDOW + 1,): stamps [ns] of the newest samples, in a ring.
+    """
+
+    stamp, repeated, missing = Number(), Number(), Number()
 
     def __init__(self, period: int) -> None:
         """period [ns]: control period, the nominal period of the IMU."""
-        self.period, self.stamp = period, -1
-        self.repeated = self.missing = 0
-        self._sample = -1  # stamp [ns] of the newest sample
-        self._difference = 0.0  # [ns] mean of sample - tick
-        self._window: deque[int] = deque(maxlen=WINDOW + 1)
+        self.memory, self.window = record(WHOLE, REAL), np.zeros(WINDOW + 1, dtype=np.int64)
+        self.memory[0] = period, -1, -1, 0, 0, 0, 0.0
+        self._follows = prepared(follows, self.memory, 0)
+        self._next = prepared(next_stamp, self.memory, self.window, 0)
 
     def follows(self, sample: int) -> bool:
-        """Return whether a sample of this stamp [ns] starts a tick; count a repeated one.
-
-        Stamps of neighbouring samples may be exchanged by jitter, older ones are no new samples.
-        """
-        if sample == self._sample:
-            self.repeated += 1
-            return False
-        return sample > self._sample - self.period or self.stamp < 0
+        """See `follows`."""
+        return self._follows(self.memory, sample)
 
     def next(self, sample: int) -> int:
-        """Return the stamp [ns] of the tick that the sample of stamp `sample` [ns] starts."""
-        self._sample = sample
-        self._window.append(sample)
-        late = sample - self.stamp - self.period
-        if not late and not self._difference:  # the exact stamps of a simulation
-            self.stamp = sample
-            return sample
-        if self.stamp < 0 or late > LONG * self.period or self._other_rate():
-            self.stamp, self._difference = max(sample, self.stamp + 1), 0.0
-            return self.stamp
-        gap = max(0, int(late / self.period + 1.0 - MISSING))
-        self.missing += gap
-        self._difference += GAIN * (late - gap * self.period - self._difference)
-        self.stamp += (1 + gap) * self.period
-        if abs(self._difference) > SHIFT * self.period:
-            self.stamp += round(self._difference)
-            self._difference = 0.0
-        return self.stamp
+        """See `next_stamp`."""
+        return self._next(self.memory, self.window, sample)
 
-    def _other_rate(self) -> bool:
-        """Return whether the measured period is not the control period."""
-        window = self._window
-        if len(window) <= WINDOW:
-            return False
-        measured = (window[-1] - window[0]) / WINDOW
-        return abs(measured - self.period) > OTHER_RATE * self.period
+
+@borrowing
+def follows(ticks: np.ndarray, sample: int) -> bool:
+    """Return whether a sample of this stamp [ns] starts a tick; count a repeated one.
+
+    ticks (1,): memory of `TickStamps`. Stamps of neighbouring samples may be exchanged by jitter,
+    older ones are no new samples.
+    """
+    m = ticks[0]
+    if sample == m.sample:
+        m.repeated += 1
+        return False
+    return sample > m.sample - m.period or m.stamp < 0
+
+
+@borrowing
+def next_stamp(ticks: np.ndarray, window: np.ndarray, sample: int) -> int:
+    """Return the stamp [ns] of the tick that the sample of stamp `sample` [ns] starts."""
+    m = ticks[0]
+    m.sample = sample
+    window[m.kept % len(window)] = sample
+    m.kept += 1
+    late = sample - m.stamp - m.period
+    if late == 0 and m.difference == 0.0:  # the exact stamps of a simulation
+        m.stamp = sample
+        return sample
+    if m.stamp < 0 or late > LONG * m.period or other_rate(m, window):
+        m.stamp, m.difference = max(sample, m.stamp + 1), 0.0
+        return m.stamp
+    gap = max(0, int(late / m.period + 1.0 - MISSING))
+    m.missing += gap
+    m.difference += GAIN * (late - gap * m.period - m.difference)
+    m.stamp += (1 + gap) * m.period
+    if abs(m.difference) > SHIFT * m.period:
+        m.stamp += int(np.rint(m.difference))
+        m.difference = 0.0
+    return m.stamp
+
+
+@borrowing
+def other_rate(m: np.record, window: np.ndarray) -> bool:
+    """Return whether the measured period is not the control period."""
+    if m.kept <= WINDOW:
+        return False
+    newest, oldest = window[(m.kept - 1) % len(window)], window[m.kept % len(window)]
+    measured = (newest - oldest) / WINDOW
+    return abs(measured - m.period) > OTHER_RATE * m.period

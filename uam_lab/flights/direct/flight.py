@@ -21,7 +21,7 @@ from uam_control.stages.control_tick import ControlTick, Imu, Joints, Pose
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.record import TickRecorder
-from uam_lab.flights.direct.steady.places import AUTOPILOT, DIVERGE
+from uam_lab.flights.direct.steady.places import AUTOPILOT, BLIND
 from uam_lab.records.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -178,8 +178,7 @@ class DirectFlight:
         See `steady.places`; hil: as in `Samples`.
         """
         control, now, magnet = self.control, self.plant.time, self.control.signals.magnet
-        if stage == DIVERGE:
-            control.estimator.diverge(control.estimator.stamp)
+        if stage == BLIND:
             self._record(now, magnet, False)
         elif stage < AUTOPILOT:
             self._record(now, magnet, control.go_on(stage))

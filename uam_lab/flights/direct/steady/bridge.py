@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import FORWARDED, UNAIDED, age_by, usable
+from uam_control.estimation.repeats import repeated
 from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.memory import numbers, put, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import LINK_GAP, Phase
 from uam_control.setpoints.attitude_target import RATES, UPRIGHT, AttitudeTarget
@@ -23,9 +25,7 @@ from uam_control.stages.bridge_stage import LIFT_PERIOD, LONGEST_STEP, BridgeSta
 from uam_control.stages.flight_measurements import MeasurementArrays, measure
 from uam_control.stages.vision_pacing import BEYOND, beyond
 from uam_control.stamps import SECOND
-from uam_lab.flights.direct.steady.estimation import keep_pose, same
 from uam_lab.flights.direct.steady.inputs import LIFT, InputArrays
-from uam_lab.flights.direct.steady.memory import load_pose, numbers, put, record, store_pose
 from uam_sim_bridge.autopilot.autopilot_estimator import (
     EstimatorArrays,
     fuse,
@@ -70,7 +70,7 @@ class BridgePart:
 
     def __init__(self, bridge: BridgeStage) -> None:
         self._bridge = bridge
-        self._newest, self._pose, self._seen = np.zeros(7), np.zeros(7), np.zeros(4)
+        self._pose, self._seen = np.zeros(7), np.zeros(4)
         self.memory = record(WHOLE, REAL)
 
     def able(self) -> bool:
@@ -105,7 +105,6 @@ class BridgePart:
             and sequence._offboard_since is not None
             and reports._reported == what
             and what[0]  # connected
-            and load_pose(vision._repeats, self._newest)
             and math.isfinite(port._period)
         )
         if not ready:
@@ -148,7 +147,7 @@ class BridgePart:
             measured._arrays,
             measured.loop_delay.numbers,
             self._pose,
-            self._newest,
+            bridge._vision._repeats.newest,
             np.zeros(7),
             self._seen,
             autopilot._setpoint,
@@ -175,7 +174,6 @@ class BridgePart:
         source, vision, hold = bridge.source, bridge._vision, bridge.source._hold
         m = numbers(self.memory)
         estimator, commander = port.autopilot.estimator, port.autopilot.commander
-        store_pose(self._newest, vision._repeats)
         vision._sent = m["vision_sent"]
         pose = self._pose.copy()
         vision._pose = (m["exposed"], pose[:3], pose[3:]) if m["pose_waits"] else None
@@ -205,10 +203,9 @@ def take_pose(a: BridgeArrays, stamp: float, position: np.ndarray, quaternion: n
     """Do what `BridgeStage.mocap` does with a pose of `stamp` [s]; False, and nothing, if it
     repeats the last one."""
     m = a.memory[0]
-    if same(position, quaternion, a.newest):
+    if repeated(position, quaternion, a.newest):
         return False
-    keep_pose(position, quaternion, a.newest)
-    keep_pose(position, quaternion, a.pose)
+    put(a.newest, a.pose)
     m.pose_waits, m.exposed, m.seen = 1, stamp, stamp
     put(quaternion, a.seen)
     return True

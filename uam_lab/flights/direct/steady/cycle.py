@@ -10,9 +10,9 @@ import numpy as np
 from uam_control.ages import UNAIDED
 from uam_control.frames import swap_sample
 from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
 from uam_control.offboard.modes import Mode
 from uam_lab.flights.direct.steady.bridge import BridgeArrays
-from uam_lab.flights.direct.steady.memory import record
 from uam_sim_bridge.autopilot.autopilot_estimator import (
     HISTORY,
     predict,

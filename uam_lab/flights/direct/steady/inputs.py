@@ -11,7 +11,9 @@ import numpy as np
 
 from uam_control.ages import BRIDGED, STALE, usable
 from uam_control.control.controllers import Controller
+from uam_control.estimation.repeats import repeated
 from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import numbers, put, record
 from uam_control.stages.supervisor_inputs import READ_PERIOD, SupervisorInputs
 from uam_control.stamps import SECOND
 from uam_control.supervision.checks import CHECKS, readings_of
@@ -20,8 +22,6 @@ from uam_control.supervision.inputs import (
     follow_bias,
     largest_of,
 )
-from uam_lab.flights.direct.steady.estimation import keep_pose, same
-from uam_lab.flights.direct.steady.memory import load_pose, numbers, put, record, store_pose
 
 _NAMES = [check.reading for check in CHECKS if check.reading]  # as `readings_of`
 _MOCAP_AGE, _STILL, _JOINT_AGE, _AUTOPILOT_AGE, _CONTROLLER_AGE, _CONTRADICTION, _MISSED = (
@@ -106,8 +106,6 @@ class InputsPart:
         if self.arrays is None:
             self._allocate()
         a = self.arrays
-        if not load_pose(inputs._repeats, a.newest):
-            return False
         a.kept[:] = False
         lift = math.nan
         for name, (_, message, _) in messages.items():
@@ -144,15 +142,15 @@ class InputsPart:
         return True
 
     def _allocate(self) -> None:
-        watched = self._kept.inputs._watched
+        inputs = self._kept.inputs
         n = self._joints
         self.arrays = InputArrays(
             np.zeros(len(KINDS), dtype=np.bool_),
             np.zeros(len(KINDS)),
             *(np.zeros(7), np.zeros(3), np.zeros(n), np.zeros(3)),
             tuple(self._gains),
-            *(np.zeros(3), np.zeros(3), np.zeros(n), np.zeros(3), np.zeros(7)),
-            tuple(watched[names] for names in self._names),
+            *(np.zeros(3), np.zeros(3), np.zeros(n), np.zeros(3), inputs._repeats.newest),
+            tuple(inputs._watched[names] for names in self._names),
             *(np.zeros(len(_NAMES)), np.zeros(3), record(WHOLE, REAL)),
         )
 
@@ -175,7 +173,6 @@ class InputsPart:
         inputs._moved, inputs._last = m["moved"], m["last"]
         inputs._bias = (m["bias_first"], m["bias_last"]) if m["bias_known"] else None
         inputs._bias_mean[:] = a.bias_mean
-        store_pose(a.newest, inputs._repeats)
         for name in SUBSYSTEMS:
             inputs._controllers[name] = m[name]
             if name in inputs._of_pose:
@@ -259,9 +256,8 @@ def read_messages(a: InputArrays, stamp: int) -> None:
         m.mocap = at[MOCAP] / SECOND
         position, quaternion = a.mocap[:3], a.mocap[3:]
         put(position, a.read_position)
-        if not same(position, quaternion, a.newest):
+        if not repeated(position, quaternion, a.newest):
             m.moved = m.mocap
-        keep_pose(position, quaternion, a.newest)
     if kept[JOINTS]:
         m.joints = at[JOINTS] / SECOND
         put(a.effort, a.read_effort)

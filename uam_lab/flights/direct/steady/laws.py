@@ -21,11 +21,11 @@ from uam_control.coordinates import ALPHA, CHI
 from uam_control.laws.errors import tracking_errors
 from uam_control.laws.law import LawInputs
 from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
 from uam_control.stages.law_stages import GAINS_PERIOD, REPORT_DELAY, LawStage, MeasuredDelay
 from uam_control.stamps import SECOND
 from uam_control.vehicle import POSITION_SERVO
 from uam_lab.flights.direct.steady.inputs import InputArrays, keep_gains
-from uam_lab.flights.direct.steady.memory import record
 
 
 class LawArrays(NamedTuple):

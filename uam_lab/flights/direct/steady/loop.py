@@ -10,11 +10,13 @@ import numpy as np
 
 from uam_control.estimation.estimator import write_biases
 from uam_control.maths.compiled import borrowing, inlined
+from uam_control.maths.memory import put
+from uam_control.stages import estimator_stage
+from uam_control.stages.estimator_stage import STATE, take_readings, take_sample
 from uam_control.stamps import SECOND
 from uam_lab.flights.direct.record import MOTORS, RowLayout, record
 from uam_lab.flights.direct.steady.bridge import BridgeArrays, send, take_pose
 from uam_lab.flights.direct.steady.cycle import CycleArrays, cycle
-from uam_lab.flights.direct.steady.estimation import NOTHING, STEADY, Estimation, estimate
 from uam_lab.flights.direct.steady.inputs import (
     BIAS,
     JOINTS,
@@ -30,14 +32,12 @@ from uam_lab.flights.direct.steady.laws import (
     Steps,
     control,
 )
-from uam_lab.flights.direct.steady.memory import put
 from uam_lab.flights.direct.steady.places import (
     AUTOPILOT,
+    BLIND,
     BRIDGE,
-    DIVERGE,
     END,
     ERROR,
-    ESTIMATE,
     LAWS,
     LISTEN,
     RECORD,
@@ -65,7 +65,7 @@ class TickArrays(NamedTuple):
     """
 
     sensing: Sensing
-    estimation: Estimation
+    estimation: estimator_stage.StageArrays
     inputs: InputArrays
     position: PositionArrays
     attitude: AttitudeArrays
@@ -159,15 +159,14 @@ def begin_tick(a: TickArrays) -> int:
         put(payload[1:4], i.payload)
     at = m.tick - m.imu_late
     sample, stamp = s.samples[at % RING], stamp_of(at * m.period)
-    found = estimate(
-        *(a.estimation, stamp, sample[0:3], sample[3:6], pose_stamp, position, quaternion),
-        *(joint_stamp, angles, speeds, a.state),
-    )
-    if found != STEADY:
-        return ESTIMATE if found == NOTHING else DIVERGE
+    if slot >= 0:
+        estimator_stage.take_pose(a.estimation, pose_stamp, position, quaternion)
+    take_readings(a.estimation, joint_stamp, angles, speeds)
+    if take_sample(a.estimation, stamp, sample[0:3], sample[3:6]) != STATE:
+        return BLIND
     c[STAMP] = stamp
-    if a.estimation.memory[0].bias_due:
-        write_biases(a.estimation.pose, a.bias)
+    if a.estimation.numbers[0].bias_due:
+        write_biases(a.estimation.estimator.pose.memory, a.bias)
         i.kept[BIAS], i.at[BIAS] = True, stamp / SECOND
         put(a.bias[1], i.bias)
     read_inputs(i, stamp)

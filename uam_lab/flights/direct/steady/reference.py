@@ -11,6 +11,7 @@ from uam_control.coordinates import CHI, CHI_DOT, Z
 from uam_control.grasp.directive import Step
 from uam_control.grasp.executive import BEFORE
 from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import numbers, record
 from uam_control.mission.course import Course
 from uam_control.mission.flight_sequence import OLDEST
 from uam_control.mission.guidance import Guidance
@@ -24,7 +25,6 @@ from uam_control.supervision import Guide, State
 from uam_control.supervision.checks import measure_all
 from uam_control.supervision.setpoint_delay import SYMMETRIC
 from uam_lab.flights.direct.steady.inputs import InputArrays
-from uam_lab.flights.direct.steady.memory import numbers, record
 
 MOST = 64  # ticks whose reference is computed ahead
 STATES = (State.TAKING_OFF, State.FLYING, State.LANDING)

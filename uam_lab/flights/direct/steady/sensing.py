@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
-from uam_lab.flights.direct.steady.memory import numbers, record
+from uam_control.maths.memory import numbers, record
 from uam_sim_bridge.plant import TruthRow
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.observation import Observed, observe, write_grip

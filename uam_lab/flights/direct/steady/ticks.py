@@ -20,7 +20,6 @@ from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.record import TickRecorder
 from uam_lab.flights.direct.steady.bridge import BridgePart
 from uam_lab.flights.direct.steady.cycle import CyclePart
-from uam_lab.flights.direct.steady.estimation import EstimationPart
 from uam_lab.flights.direct.steady.inputs import InputsPart
 from uam_lab.flights.direct.steady.laws import (
     ArmPart,
@@ -83,7 +82,6 @@ class SteadyTicks:
         if not all(map(counts_references, self._steps)):  # a law of somebody's own
             self.able = False
             return
-        self._estimation = EstimationPart(stages.estimator)
         self._laws = (
             LawPart(stages.position),
             AttitudePart(stages.attitude, stages.measured_delay),
@@ -174,7 +172,7 @@ class SteadyTicks:
             and reference.steady(signals.stamp)
             and bridge.load()
             and self._cycle.load()
-            and self._estimation.load()
+            and not stages.estimator.held_back
             and self._inputs.load()
             and all(part.load() for part in self._laws)
         )
@@ -190,7 +188,7 @@ class SteadyTicks:
         """Return the loop with the arrays of all parts; made anew if objects have changed."""
         flight, stages = self._flight, self._flight.control
         made = (
-            *(flight.recorder.table.values, stages.estimator.estimator),
+            flight.recorder.table.values,
             *(one.parameters for one in self._controllers),
             *(stages.bridge.map._flat, flight.autopilot.autopilot._loop),
             *(stages.mission.mission._guidance, stages.mission.mission._parameters),
@@ -201,7 +199,7 @@ class SteadyTicks:
             recorder = flight.recorder
             arrays = TickArrays(
                 self._sensing.arrays,
-                self._estimation.arrays,
+                stages.estimator.arrays,
                 self._inputs.arrays,
                 position_arrays(self._laws[0]),
                 attitude_arrays(self._laws[1]),
@@ -234,7 +232,6 @@ class SteadyTicks:
         row, first, following, slot, stamp, begun, sent, cycles, _ = self._counts.tolist()
         observed = end != END
         self._sensing.store(observed)
-        self._estimation.store()
         self._inputs.store()
         for part in self._laws:
             part.store()
