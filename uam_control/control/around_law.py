@@ -5,103 +5,175 @@ The steps themselves are in `tracking_errors`, `output_limits`, `arm_load`, `thr
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from uam_control.control.arm_load import arm_load
 from uam_control.control.output_limits import (
+    LONGEST_PREDICTION,
     ForceCompletion,
     complete_and_limit,
     complete_effort,
     lead_attitude,
     limit_torque,
 )
+from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA
+from uam_control.coordinates import ALPHA, CHI
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
+from uam_control.laws.law import LawArrays
 from uam_control.maths.compiled import jit
+
+# saturated: whether a limit changed the output of the last tick; flying: whether the law has begun;
+# printed: form of the errors' rates; frozen: see `Law`; time [s]: counted for the goals of servos
+WHOLE, REAL = "saturated flying printed frozen", "time"
+
+
+class ControllerArrays(NamedTuple):
+    """Of every controller: those of its law; errors (3, 6 + n), see `tracking_errors`, own: their
+    rows of the subsystem; norms (3,); tau (m,): limited output; numbers (1,): see WHOLE,
+    REAL."""
+
+    law: LawArrays
+    errors: np.ndarray
+    own: tuple[np.ndarray, np.ndarray, np.ndarray]
+    norms: np.ndarray
+    tau: np.ndarray
+    numbers: np.ndarray
+
+
+class PositionArrays(NamedTuple):
+    """Of the `PositionController`. integral (3,) [m/s^2] of integral_gain e; filter, lead,
+    attitude: see `attitude_reference_step`."""
+
+    all: ControllerArrays
+    completion: ForceCompletion
+    integral: np.ndarray
+    cutoff: float
+    filter: np.ndarray
+    lead: np.ndarray
+    attitude: np.ndarray
+
+
+# [s] loop delay, time ahead for which the errors are predicted; the others: parameters
+PREDICTION = "measured ahead prediction nominal"
+
+
+class AttitudeArrays(NamedTuple):
+    """Of the `AttitudeController`. arm, joints (n,): record and torques of `arm_load`, used if
+    `loaded`; inertia [kg m^2]: about pitch; washout, slow (3,): see `wash_out`; prediction (1,):
+    see PREDICTION, and whether the delay counts."""
+
+    all: ControllerArrays
+    arm: np.ndarray
+    joints: np.ndarray
+    loaded: bool
+    inertia: float
+    washout: np.ndarray
+    slow: np.ndarray
+    torque_max: np.ndarray
+    prediction: np.ndarray
+
+
+class ArmArrays(NamedTuple):
+    """Of the `ArmController`. arm, load (n,): record and torques of `arm_load`, used if `loaded`;
+    inertia, gain, limit, integral: see `complete_effort`. command (n,): is given goals if `goals`,
+    of reference or state, plus compliance [rad/(N m)] tau; hold (1,): when, see `is_new`."""
+
+    all: ControllerArrays
+    arm: np.ndarray
+    load: np.ndarray
+    loaded: bool
+    inertia: np.ndarray
+    gain: np.ndarray
+    limit: float
+    integral: np.ndarray
+    torque_max: np.ndarray
+    command: np.ndarray
+    goals: bool
+    of_reference: bool
+    compliance: float
+    hold: np.ndarray
 
 
 @jit
-def begin_attitude(
+def begin_law(
+    a: ControllerArrays,
     state: np.ndarray,
     reference: np.ndarray,
     attitude_reference: np.ndarray,
     flying: bool,
-    printed: bool,
-    arm: np.ndarray,
-    loaded: bool,
-    inertia: float,
-    ahead: float,
-    corner: np.ndarray,
-    dt: float,
-    errors: np.ndarray,
-    norms: np.ndarray,
-    joints: np.ndarray,
-    slow: np.ndarray,
 ) -> None:
-    """Write the errors of the attitude law: tracking errors, arm's moment, prediction.
+    """Write the errors of a law: see `tracking_errors`."""
+    printed = a.numbers[0].printed != 0
+    tracking_errors(state, reference, attitude_reference, flying, printed, a.errors, a.norms)
 
-    arm, joints (n,): record and torques of `arm_load`, used if `loaded`; inertia [kg m^2]: about
-    pitch; the others: see `tracking_errors` and `lead_attitude`.
-    """
-    tracking_errors(state, reference, attitude_reference, flying, printed, errors, norms)
+
+@jit
+def begin_attitude(
+    a: AttitudeArrays,
+    state: np.ndarray,
+    reference: np.ndarray,
+    attitude_reference: np.ndarray,
+    dt: float,
+) -> None:
+    """Write the errors of the attitude law: tracking errors, arm's moment, prediction."""
+    begin_law(a.all, state, reference, attitude_reference, True)
     pitch = 0.0
-    if loaded:
-        pitch = arm_load(arm, reference, joints) / inertia
-    lead_attitude(errors, ahead, pitch, corner, dt, slow)
+    if a.loaded:
+        pitch = arm_load(a.arm, reference, a.joints) / a.inertia
+    lead_attitude(a.all.errors, a.prediction[0].ahead, pitch, a.washout, dt, a.slow)
 
 
 @jit
-def end_position(
-    reference: np.ndarray,
-    e: np.ndarray,
-    completion: ForceCompletion,
-    saturated: bool,
-    dt: float,
-    integral: np.ndarray,
-    tau: np.ndarray,
-    limited: np.ndarray,
-    cutoff: float,
-    filtered: np.ndarray,
-    lead: np.ndarray,
-    attitude: np.ndarray,
-) -> bool:
-    """Write tau_p to limited (3,) [N, ENU] and the desired attitude to attitude (3, 3).
+def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
+    """Use the measured `loop_delay` [s], from a setpoint to the gyro's response; NaN: unknown.
 
-    The arguments are those of `complete_and_limit` and `attitude_reference_step`. Returns whether a
-    limit acted.
+    prediction (1,): of `AttitudeArrays`. The delay beyond the nominal one is added to it.
     """
-    acted = complete_and_limit(reference, e, completion, saturated, dt, integral, tau, limited)
-    attitude_reference_step(limited, reference, cutoff, dt, filtered, lead, attitude)
-    return acted
+    p = prediction[0]
+    p.measured, p.ahead = loop_delay, p.prediction
+    if p.counts and math.isfinite(loop_delay):
+        p.ahead = min(LONGEST_PREDICTION, p.prediction + max(0.0, loop_delay - p.nominal))
 
 
 @jit
-def end_arm(
-    reference: np.ndarray,
-    errors: np.ndarray,
-    arm: np.ndarray,
-    loaded: bool,
-    inertia: np.ndarray,
-    gain: np.ndarray,
-    limit: float,
-    torque_max: np.ndarray,
-    saturated: bool,
-    dt: float,
-    load: np.ndarray,
-    integral: np.ndarray,
-    tau: np.ndarray,
-    limited: np.ndarray,
-) -> bool:
-    """Complete the law's torques tau (n,), write them within ±torque_max to limited (n,), [N m].
+def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
+    """Complete the law's force and limit it; then write the desired attitude.
 
-    errors (3, 6 + n): see `tracking_errors`; arm, load (n,): record and torques of `arm_load`, used
-    if `loaded`; the others: see `complete_effort`. Returns whether a limit acted.
+    See `complete_and_limit` and `attitude_reference_step`.
     """
-    if loaded:
-        arm_load(arm, reference, load)
-    acceleration_d, e = errors[FEEDFORWARD, ALPHA:], errors[E, ALPHA:]
-    complete_effort(
-        acceleration_d, e, load, loaded, inertia, gain, limit, saturated, dt, integral, tau
+    m, tau = a.all.numbers[0], a.all.tau
+    saturated, e, found = m.saturated != 0, a.all.own[E], a.all.law.tau
+    m.saturated = complete_and_limit(
+        reference, e, a.completion, saturated, dt, a.integral, found, tau
     )
-    return limit_torque(tau, torque_max, limited)
+    attitude_reference_step(tau, reference, a.cutoff, dt, a.filter, a.lead, a.attitude)
+
+
+@jit
+def end_attitude(a: AttitudeArrays) -> None:
+    """Limit the law's torques: see `limit_torque`."""
+    a.all.numbers[0].saturated = limit_torque(a.all.law.tau, a.torque_max, a.all.tau)
+
+
+@jit
+def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
+    """Complete the law's torques and limit them; then write goals of the servos if they are due."""
+    m, errors, tau = a.all.numbers[0], a.all.errors, a.all.law.tau
+    if a.loaded:
+        arm_load(a.arm, reference, a.load)
+    complete_effort(
+        *(errors[FEEDFORWARD, ALPHA:], errors[E, ALPHA:], a.load, a.loaded, a.inertia, a.gain),
+        *(a.limit, m.saturated != 0, dt, a.integral, tau),
+    )
+    m.saturated = limit_torque(tau, a.torque_max, a.all.tau)
+    if not a.goals:
+        return
+    m.time += dt
+    if is_new(a.hold, m.time):
+        base = reference if a.of_reference else state
+        for i in range(len(a.command)):
+            a.command[i] = base[CHI, ALPHA + i] + a.compliance * a.all.tau[i]

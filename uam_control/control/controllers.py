@@ -11,23 +11,34 @@ import math
 
 import numpy as np
 
-from uam_control.control.around_law import begin_attitude, end_arm, end_position
+from uam_control.control.around_law import (
+    PREDICTION,
+    REAL,
+    WHOLE,
+    ArmArrays,
+    AttitudeArrays,
+    ControllerArrays,
+    PositionArrays,
+    begin_attitude,
+    begin_law,
+    end_arm,
+    end_attitude,
+    end_position,
+    predict_by,
+)
 from uam_control.control.output_limits import (
-    LONGEST_PREDICTION,
     ArmLimits,
     AttitudeLimits,
     ForceCompletion,
     PositionLimits,
-    TorqueLimits,
-    limit_torque,
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
-from uam_control.laws.errors import E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import prepared
+from uam_control.maths.memory import Flag, record
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import POSITION_SERVO
 
@@ -38,22 +49,21 @@ class Controller:
     """Base of the three controllers: errors of the whole vehicle, one law, its saturation.
 
     `adaptation` (len(names),): the law's published gains; `names`: their names.
-    `saturated`: whether a limit changed the output of the last tick.
+    `saturated`: whether a limit changed the output of the last tick; `flying`: whether the law has
+    begun; `arrays`: all that compiled functions use, made anew with the parameters.
     """
 
     columns: slice
+    saturated, flying = Flag(), Flag()
 
     def __init__(self, parameters: LawParameters) -> None:
         self.law, self._parameters = catalogue.law(parameters.law)(parameters), parameters
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
-        self.saturated = self._flying = False
-        self._allocate((3, ALPHA))
-        self._norms = np.zeros(3)
-        rows = self._errors
-        self._tracking_errors = prepared(
-            tracking_errors, rows, rows, rows, True, True, rows, self._norms
-        )
+        self.memory = record(WHOLE, REAL)
+        self._errors = np.zeros((3, ALPHA))
+        self._norms, self._tau = np.zeros(3), np.zeros(len(parameters.inertia))
+        self.set_parameters(parameters)
 
     @property
     def parameters(self) -> LawParameters:
@@ -70,45 +80,49 @@ class Controller:
             raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
         self.law.set_parameters(parameters)
         self._parameters = parameters
-        self._printed = parameters.error_rate_form == "printed"
+        self.memory["frozen"] = self.law.frozen
+        self.memory["printed"] = parameters.error_rate_form == "printed"
+        self._make_arrays()
+
+    def _make_arrays(self) -> None:
+        """Make `arrays`, and prepare the functions that use them."""
+        self._own = tuple(self._errors[:, self.columns])
+        of_all = self.law.arrays, self._errors, self._own, self._norms, self._tau, self.memory
+        self.arrays = self._arrays(ControllerArrays(*of_all))
+
+    def _arrays(self, of_all: ControllerArrays) -> tuple:
+        """Return `arrays`; of_all: those of every controller."""
+        raise NotImplementedError
 
     def reset_adaptation(self) -> None:
         """Set the adapted gains to their initial values in flight; nothing else changes."""
         self.law.reset_adaptation()
-
-    def _allocate(self, shape: tuple[int, int]) -> None:
-        """Allocate the errors for a state of this shape."""
-        self._errors = np.zeros(shape)
-        self._own = tuple(self._errors[:, self.columns])
 
     @property
     def errors(self) -> np.ndarray:
         """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick; see `tracking_errors`."""
         return self._errors
 
-    def _track(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-    ) -> None:
-        """Write the errors of this tick."""
-        self._tracking_errors(
-            state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
-        )
+    def _fit(self, state: np.ndarray) -> None:
+        """Allocate the errors for the shape of `state`, which the first tick tells."""
+        if state.shape != self._errors.shape:
+            self._errors = np.zeros(state.shape)
+            self._make_arrays()
 
-    def _law_output(self, dt: float) -> np.ndarray:
-        return self.law.update(*self._own, self._norms, self.saturated, dt)
+    def _run_law(self, dt: float) -> None:
+        self.law.update(*self._own, self._norms, self.saturated, dt)
 
     def _begins(self) -> bool:
         """Return whether this is the first tick of the law since `_idle`."""
-        begins, self._flying = not self._flying, True
+        begins, self.flying = not self.flying, True
         return begins
 
-    def _idle(self) -> None:
+    def _idle(self) -> np.ndarray:
+        """Reset the law; return its output, zero."""
         self.law.reset()
-        self.saturated = self._flying = False
+        self.saturated = self.flying = False
+        self._tau[:] = 0.0
+        return self._tau
 
 
 class PositionController(Controller):
@@ -117,18 +131,15 @@ class PositionController(Controller):
     columns = POSITION
 
     def __init__(self, parameters: PositionLimits) -> None:
-        super().__init__(parameters)
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
-        self._integral = np.zeros(3)  # [m/s^2] integral of integral_gain e
-        self._tau = np.zeros(3)
-        self.set_parameters(parameters)
+        self._integral = np.zeros(3)
+        super().__init__(parameters)
 
-    def set_parameters(self, parameters: PositionLimits) -> None:
-        """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
-        super().set_parameters(parameters)
-        p, self._attitude.cutoff = parameters, parameters.attitude_cutoff
+    def _arrays(self, of_all: ControllerArrays) -> PositionArrays:
+        p, desired = self._parameters, self._attitude
+        desired.cutoff = cutoff = p.attitude_cutoff
         mass = p.gravity_feedforward_mass
-        self._completion = ForceCompletion(
+        completion = ForceCompletion(
             mass * np.array(p.drag_feedforward),
             np.array(p.inertia, dtype=float),
             np.array(p.integral_gain, dtype=float),
@@ -139,12 +150,12 @@ class PositionController(Controller):
             float(p.thrust_max),
             float(p.tilt_max),
         )
-        desired = self._attitude
-        self._end = prepared(
-            *(end_position, desired.value, self._integral, self._completion, False, 0.0),
-            *(self._integral, self._tau, self._tau, 0.0, desired.filter, desired.lead),
-            desired.value,
-        )
+        filtered = float(cutoff), desired.filter, desired.lead, desired.value
+        arrays = PositionArrays(of_all, completion, self._integral, *filtered)
+        rows = self._errors
+        self._begin = prepared(begin_law, of_all, rows, rows, desired.value, True)
+        self._end = prepared(end_position, arrays, rows, 0.0)
+        return arrays
 
     @property
     def attitude_reference(self) -> np.ndarray:
@@ -167,91 +178,21 @@ class PositionController(Controller):
         of a payload and the wind are still there.
         """
         if not flying:
-            self._idle()
-            self._tau[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
-            return self._tau
+            return self._idle()
         if self._begins():
             if _in_flight(reference):
                 self._attitude.begin(state, reference)
             else:
                 self._integral[:] = 0.0
-        if state.shape != self._errors.shape:
-            self._allocate(state.shape)
-        desired = self._attitude
-        self._track(state, reference, desired.value, True)
-        self.saturated = self._end(
-            reference,
-            self._own[E],
-            self._completion,
-            self.saturated,
-            dt,
-            self._integral,
-            self._law_output(dt),
-            self._tau,
-            desired.cutoff,
-            desired.filter,
-            desired.lead,
-            desired.value,
-        )
+        self._fit(state)
+        self._begin(self.arrays.all, state, reference, self._attitude.value, True)
+        self._run_law(dt)
+        self._end(self.arrays, reference, dt)
         return self._tau
 
 
-class TorqueController(Controller):
-    """Base for tau_q and tau_alpha: the law's output within the torque limits."""
-
-    on_ground = False  # whether the law also runs while not flying
-
-    def __init__(self, parameters: TorqueLimits) -> None:
-        super().__init__(parameters)
-        self._tau = np.zeros(len(parameters.torque_max))
-
-    def set_parameters(self, parameters: TorqueLimits) -> None:
-        """See `Controller.set_parameters`."""
-        super().set_parameters(parameters)
-        self._torque_max = np.array(parameters.torque_max, dtype=float)
-
-    def update(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> np.ndarray:
-        """Return the torque (n,) [N m], one per axis of the subsystem.
-
-        While not flying, return zero and reset the law, unless it runs `on_ground`. state,
-        reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
-        controller, same tick, see `AttitudeReference.value`; dt [s].
-        """
-        if not (flying or self.on_ground):
-            self._idle()
-            self._tau[:] = 0.0
-            return self._tau
-        if state.shape != self._errors.shape:
-            self._allocate(state.shape)
-        self._begin(state, reference, attitude_reference, flying, dt)
-        self.saturated = self._end(reference, self._law_output(dt), dt)
-        return self._tau
-
-    def _begin(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> None:
-        """Write the errors of this tick, for the law."""
-        self._track(state, reference, attitude_reference, flying)
-
-    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
-        """Write the law's output tau (n,) within its limits to `_tau`; whether a limit acted."""
-        raise NotImplementedError
-
-
-class AttitudeController(TorqueController):
+class AttitudeController(Controller):
     """tau_q (3,) [N m, FLU], eq. (18), ct2.
 
     The autopilot's rate loop integrates: it adds its integral of the feedforward's effect to
@@ -262,132 +203,31 @@ class AttitudeController(TorqueController):
     columns = ATTITUDE
 
     def __init__(self, parameters: AttitudeLimits) -> None:
-        super().__init__(parameters)
-        self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
-        self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
-        self.set_parameters(parameters)
+        self.prediction = record("counts", PREDICTION)
+        self.prediction["measured"] = math.nan
+        self._predict = prepared(predict_by, self.prediction, 0.0)
+        super().__init__(parameters)
 
-    def set_parameters(self, parameters: AttitudeLimits) -> None:
-        """See `Controller.set_parameters`."""
-        super().set_parameters(parameters)
-        self._washout = np.array(parameters.feedforward_washout, dtype=float)
-        self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
-        rows, axes = self._errors, self._slow
-        self._prepare = prepared(
-            *(begin_attitude, rows, rows, rows, True, True, self._arm, True, 0.0, 0.0),
-            *(axes, 0.0, rows, self._norms, self._joints, axes),
+    def _arrays(self, of_all: ControllerArrays) -> AttitudeArrays:
+        p, now = self._parameters, self.prediction
+        now["counts"], now["nominal"] = p.prediction_measured, p.prediction_nominal
+        now["prediction"] = p.prediction
+        self.measured(now["measured"].item())
+        arrays = AttitudeArrays(
+            *(of_all, p.load_record(), np.zeros(len(p.link_masses))),
+            *(bool(p.arm_feedforward), float(p.inertia[1])),
+            *(np.array(p.feedforward_washout, dtype=float), self._slow),
+            *(np.array(p.torque_max, dtype=float), now),
         )
-        self.measured(self._measured)
+        rows = self._errors
+        self._begin = prepared(begin_attitude, arrays, rows, rows, np.zeros((3, 3)), 0.0)
+        self._end = prepared(end_attitude, arrays)
+        return arrays
 
     def measured(self, loop_delay: float) -> None:
-        """Use the measured `loop_delay` [s], from a setpoint to the gyro's response; NaN: unknown.
-
-        It counts with `prediction_measured`.
-        """
-        self._measured, self._ahead = loop_delay, self.ahead(loop_delay)
-
-    def ahead(self, loop_delay: float) -> float:
-        """Return the time [s] by which errors are predicted with a measured `loop_delay` [s]."""
-        p = self.parameters
-        if not (p.prediction_measured and math.isfinite(loop_delay)):
-            return p.prediction
-        beyond = max(0.0, loop_delay - p.prediction_nominal)
-        return min(LONGEST_PREDICTION, p.prediction + beyond)
-
-    def _begin(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> None:
-        p = self._parameters
-        if self._begins() and _in_flight(reference):
-            self._slow[:] = math.nan
-        self._prepare(
-            state,
-            reference,
-            attitude_reference,
-            flying,
-            self._printed,
-            self._arm,
-            p.arm_feedforward,
-            p.inertia[1],
-            self._ahead,
-            self._washout,
-            dt,
-            self._errors,
-            self._norms,
-            self._joints,
-            self._slow,
-        )
-
-    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
-        return self._limit(tau, self._torque_max, self._tau)
-
-    def _idle(self) -> None:
-        super()._idle()
-        self._slow[:] = 0.0
-
-
-class ArmController(TorqueController):
-    """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground.
-
-    `command` (n,): what the servos are given, tau_alpha or, with `setpoint: position`, goal
-    positions [rad] = reference or state + goal_compliance tau_alpha, renewed at `goal_rate`.
-    """
-
-    columns = ARM
-    on_ground = True
-
-    def __init__(self, parameters: ArmLimits) -> None:
-        super().__init__(parameters)
-        self._hold, self._time = SampleHold(parameters.goal_rate), 0.0
-        self._integral = np.zeros(len(self._tau))  # [rad/s^2] integral of integral_gain e
-        self._load = np.zeros(len(self._tau))  # [N m]
-        self.set_parameters(parameters)
-        to_goals = parameters.setpoint == POSITION_SERVO
-        # goals do not exist before the first tick
-        self.command = np.full(len(self._tau), np.nan) if to_goals else self._tau
-
-    def set_parameters(self, parameters: ArmLimits) -> None:
-        """See `Controller.set_parameters`."""
-        super().set_parameters(parameters)
-        self._hold.rate = parameters.goal_rate
-        self._arm = parameters.load_record()
-        n = self._load
-        self._complete = prepared(
-            *(end_arm, self._errors, self._errors, self._arm, True, n, n, 0.0, n, True, 0.0),
-            *(n, n, n, n),
-        )
-        self._inertia = np.array(parameters.inertia, dtype=float)
-        self._integral_gain = np.array(parameters.integral_gain, dtype=float)
-
-    def reset_adaptation(self) -> None:
-        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
-        super().reset_adaptation()
-        self._integral[:] = 0.0
-
-    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
-        p = self._parameters
-        return self._complete(
-            reference,
-            self._errors,
-            self._arm,
-            p.arm_feedforward,
-            self._inertia,
-            self._integral_gain,
-            p.integral_limit,
-            self._torque_max,
-            self.saturated,
-            dt,
-            self._load,
-            self._integral,
-            tau,
-            self._tau,
-        )
+        """See `predict_by`."""
+        self._predict(self.prediction, loop_delay)
 
     def update(
         self,
@@ -397,14 +237,77 @@ class ArmController(TorqueController):
         flying: bool,
         dt: float,
     ) -> np.ndarray:
-        """See `TorqueController.update`; also sets `command`."""
-        tau, p = super().update(state, reference, attitude_reference, flying, dt), self._parameters
-        if p.setpoint == POSITION_SERVO:
-            self._time += dt
-            if self._hold.due(self._time):
-                base = reference if p.goal_from == "reference" else state
-                self.command[:] = base[CHI, ARM] + p.goal_compliance * tau
-        return tau
+        """Return the torques; while not flying, return zero and reset the law.
+
+        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
+        controller, same tick, see `AttitudeReference.value`; dt [s].
+        """
+        if not flying:
+            self._slow[:] = 0.0
+            return self._idle()
+        if self._begins() and _in_flight(reference):
+            self._slow[:] = math.nan
+        self._fit(state)
+        self._begin(self.arrays, state, reference, attitude_reference, dt)
+        self._run_law(dt)
+        self._end(self.arrays)
+        return self._tau
+
+
+class ArmController(Controller):
+    """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground.
+
+    `command` (n,): what the servos are given, tau_alpha or, with `setpoint: position`, goal
+    positions [rad] = reference or state + goal_compliance tau_alpha, renewed at `goal_rate`.
+    """
+
+    columns = ARM
+
+    def __init__(self, parameters: ArmLimits) -> None:
+        joints = len(parameters.inertia)
+        self._hold = SampleHold(parameters.goal_rate)
+        self._integral, self._load = np.zeros(joints), np.zeros(joints)
+        # goals do not exist before the first tick
+        to_goals = parameters.setpoint == POSITION_SERVO
+        self.command = np.full(joints, np.nan) if to_goals else None
+        super().__init__(parameters)
+
+    def _arrays(self, of_all: ControllerArrays) -> ArmArrays:
+        p, self._hold.rate = self._parameters, self._parameters.goal_rate
+        to_goals = p.setpoint == POSITION_SERVO
+        if not to_goals:
+            self.command = self._tau
+        arrays = ArmArrays(
+            *(of_all, p.load_record(), self._load, bool(p.arm_feedforward)),
+            *(np.array(p.inertia, dtype=float), np.array(p.integral_gain, dtype=float)),
+            *(float(p.integral_limit), self._integral, np.array(p.torque_max, dtype=float)),
+            *(self.command, to_goals, p.goal_from == "reference", float(p.goal_compliance)),
+            self._hold.memory,
+        )
+        rows = self._errors
+        self._begin = prepared(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)
+        self._end = prepared(end_arm, arrays, rows, rows, 0.0)
+        return arrays
+
+    def reset_adaptation(self) -> None:
+        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
+        super().reset_adaptation()
+        self._integral[:] = 0.0
+
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        """Return the torques and set `command`; the arguments: see `AttitudeController.update`."""
+        self._fit(state)
+        self._begin(self.arrays.all, state, reference, attitude_reference, flying)
+        self._run_law(dt)
+        self._end(self.arrays, state, reference, dt)
+        return self._tau
 
 
 def _in_flight(reference: np.ndarray) -> bool:

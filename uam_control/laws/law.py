@@ -39,6 +39,14 @@ class LawInputs(NamedTuple):
     dt: float
 
 
+class LawArrays(NamedTuple):
+    """What `Law.step` gets at every tick: the record of its parameters, its adapted gains, tau."""
+
+    record: np.ndarray
+    adaptation: np.ndarray
+    tau: np.ndarray
+
+
 class Law:
     """The law of one subsystem and its adapted gains.
 
@@ -53,7 +61,8 @@ class Law:
     | `step` | the compiled function of one tick: step(record, inputs, adaptation, tau) |
 
     `names`: of the published gains, which are the first values of `adaptation`, a float64 array
-    (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`).
+    (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`). `arrays`:
+    made anew with the parameters.
     """
 
     kind: type[LawParameters]
@@ -84,10 +93,10 @@ class Law:
         """Use `parameters` (validated) from the next tick on; the adapted gains stay."""
         self.parameters = parameters
         self.frozen = not parameters.adapt
-        self._record = parameters.record()
+        self.arrays = LawArrays(parameters.record(), self.adaptation, self._tau)
         own = self._tau
         inputs = LawInputs(own, own, own, np.zeros(3), False, False, 0.0)
-        self._step = prepared(type(self).step, self._record, inputs, self.adaptation, own)
+        self._step = prepared(type(self).step, self.arrays.record, inputs, self.adaptation, own)
 
     def reset(self) -> None:
         """Set the adapted gains to their initial values, and filters and time to zero."""
@@ -116,5 +125,5 @@ class Law:
         The next call reuses the returned array.
         """
         inputs = LawInputs(e, e_dot, acceleration_d, norms, saturated, self.frozen, dt)
-        self._step(self._record, inputs, self.adaptation, self._tau)
+        self._step(self.arrays.record, inputs, self.adaptation, self._tau)
         return self._tau

@@ -10,11 +10,13 @@ import numpy as np
 from uam_control.maths.compiled import borrowing
 
 
-def record(whole: str, real: str = "") -> np.ndarray:
-    """Return a structured array (1,) of zeros; whole, real: names of its int64 and float64."""
+def record(whole: str, real: str = "", rows: int = 1) -> np.ndarray:
+    """Return a structured array (rows,) of zeros; whole, real: names of its int64 and float64."""
     fields = [(name, np.int64) for name in whole.split()]
     fields += [(name, np.float64) for name in real.split()]
-    return np.zeros(1, np.dtype((np.record, fields)))  # fields are attributes in plain Python, too
+    return np.zeros(
+        rows, np.dtype((np.record, fields))
+    )  # fields are attributes in plain Python, too
 
 
 def numbers(memory: np.ndarray) -> dict[str, int | float]:
@@ -33,6 +35,13 @@ class Number:
 
     def __set__(self, one: Any, value: float) -> None:
         one.memory[self._name] = value
+
+
+class Flag(Number):
+    """A whole number of `memory` that is 0 or 1, as a bool."""
+
+    def __get__(self, one: Any, owner: type) -> bool:
+        return one.memory[self._name].item() != 0
 
 
 class Known(Number):

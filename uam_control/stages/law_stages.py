@@ -3,39 +3,66 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 
+from uam_control.control.around_law import predict_by
 from uam_control.control.controllers import AttitudeController, Controller
+from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.memory import Flag, record
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 
 REPORT_DELAY = 200_000_000  # [ns] after which a report of a tick has arrived at every stage
+MOST_REPORTS = 256  # within that time
 GAINS_PERIOD = 20_000_000  # [ns] between two publications of the adapted gains
+NEVER = -(2**62)  # [ns] stamp before the first tick
 
 
 class MeasuredDelay:
     """The loop delay that the bridge reports, for the attitude law of a later tick.
 
     A report is used when it has arrived in every engine, REPORT_DELAY after its stamp.
-    `reports`: those that have not, the stamp [ns] and the loop delay [s] of each.
     """
 
     def __init__(self, controller: AttitudeController) -> None:
-        self._controller = controller
-        self.reports: deque[tuple[int, float]] = deque()
+        # count: of the reports that have not arrived, the oldest first; newest [ns]: stamp
+        self.memory = record("count newest")
+        # stamp [ns] and loop delay [s] of each
+        self._reports = record("stamp", "loop_delay", MOST_REPORTS)
+        self.arrays = self.memory, self._reports, controller.prediction
+        self._apply = prepared(apply_reports, *self.arrays, 0)
 
     def report(self, stamp: int, loop_delay: float | None) -> None:
         """Take the report of the tick `stamp` [ns]; loop_delay [s], None: unknown."""
-        if self.reports and stamp < self.reports[-1][0]:  # a new simulation
-            self.reports.clear()
-        self.reports.append((stamp, math.nan if loop_delay is None else loop_delay))
+        m = self.memory[0]
+        if stamp < m.newest or m.count == MOST_REPORTS:  # a new simulation
+            m.count = 0
+        self._reports[m.count] = stamp, math.nan if loop_delay is None else loop_delay
+        m.count, m.newest = m.count + 1, stamp
 
     def apply(self, stamp: int) -> None:
-        """Give the controller the newest report that has arrived at the tick `stamp` [ns]."""
-        while self.reports and self.reports[0][0] <= stamp - REPORT_DELAY:
-            self._controller.measured(self.reports.popleft()[1])
+        """See `apply_reports`."""
+        self._apply(*self.arrays, stamp)
+
+
+@borrowing
+def apply_reports(
+    delay: np.ndarray, reports: np.ndarray, prediction: np.ndarray, stamp: int
+) -> None:
+    """Use the newest report that has arrived at the tick `stamp` [ns].
+
+    The first three: `MeasuredDelay.arrays`.
+    """
+    m, used = delay[0], 0
+    while used < m.count and reports[used].stamp <= stamp - REPORT_DELAY:
+        predict_by(prediction, reports[used].loop_delay)
+        used += 1
+    if used:
+        m.count -= used
+        for i in range(m.count):
+            reports[i].stamp = reports[i + used].stamp
+            reports[i].loop_delay = reports[i + used].loop_delay
 
 
 class LawStage:
@@ -45,26 +72,35 @@ class LawStage:
     supervisor.
     """
 
+    gains_due = Flag()
+
     def __init__(self, controller: Controller, timing: Timing) -> None:
         self.controller = controller
-        self.gains_due = False
-        self._period = timing.period  # [ns]
-        self._reported = range(GAINS_PERIOD)  # stamps [ns] of the period of the last tick
-        self._last: int | None = None  # [ns] last tick
+        # [ns]: control period, stamp of the last tick, begin of its period of the gains
+        self.memory = record("gains_due period last begun")
+        self.memory[0] = False, timing.period, NEVER, 0
+        self._step = prepared(step_to, self.memory, 0)
 
     def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
         """Return tau of the controller at the tick `stamp` [ns].
 
-        inputs: those of the controller's `update`, without dt. dt is the time since the last tick;
-        one control period at the first tick, after a gap of more than ten periods and after a step
-        back in time: the laws must not integrate over a time without samples.
+        inputs: those of the controller's `update`, without dt: see `step_to`.
         """
-        last, self._last = self._last, stamp
-        self.gains_due = stamp not in self._reported
-        if self.gains_due:
-            begin = stamp // GAINS_PERIOD * GAINS_PERIOD
-            self._reported = range(begin, begin + GAINS_PERIOD)
-        step = self._period if last is None else stamp - last
-        if not 0 < step <= 10 * self._period:
-            step = self._period
-        return self.controller.update(*inputs, step / SECOND)
+        return self.controller.update(*inputs, self._step(self.memory, stamp))
+
+
+@borrowing
+def step_to(stage: np.ndarray, stamp: int) -> float:
+    """Return the time [s] since the last tick, at the tick `stamp` [ns]; stage (1,): memory.
+
+    One control period at the first tick, after a gap of more than ten periods and after a step
+    back in time: the laws must not integrate over a time without samples.
+    """
+    m = stage[0]
+    step, m.last = stamp - m.last, stamp
+    m.gains_due = not m.begun <= stamp < m.begun + GAINS_PERIOD
+    if m.gains_due:
+        m.begun = stamp // GAINS_PERIOD * GAINS_PERIOD
+    if not 0 < step <= 10 * m.period:
+        step = m.period
+    return step / SECOND

@@ -218,12 +218,12 @@ class InputsPart:
 
 @borrowing
 def keep_gains(a: InputArrays, controller: int, stamp: int, values: np.ndarray) -> None:
-    """Keep the gains of a controller, 0..2, at the tick `stamp` [ns]."""
+    """Keep the gains of a controller, 0..2, the first of values, at the tick `stamp` [ns]."""
     a.kept[GAINS + controller] = True
     a.at[GAINS + controller] = stamp / SECOND
     for i in range(3):  # a tuple of arrays of different lengths
         if i == controller:
-            for j in range(len(values)):
+            for j in range(len(a.gains[i])):
                 a.gains[i][j] = values[j]
 
 

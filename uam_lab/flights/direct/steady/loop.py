@@ -25,13 +25,7 @@ from uam_lab.flights.direct.steady.inputs import (
     InputArrays,
     read_inputs,
 )
-from uam_lab.flights.direct.steady.laws import (
-    ArmArrays,
-    AttitudeArrays,
-    PositionArrays,
-    Steps,
-    control,
-)
+from uam_lab.flights.direct.steady.laws import LawArrays, Steps, control
 from uam_lab.flights.direct.steady.places import (
     AUTOPILOT,
     BLIND,
@@ -67,9 +61,7 @@ class TickArrays(NamedTuple):
     sensing: Sensing
     estimation: estimator_stage.StageArrays
     inputs: InputArrays
-    position: PositionArrays
-    attitude: AttitudeArrays
-    arm: ArmArrays
+    laws: LawArrays
     bridge: BridgeArrays
     reference: ReferenceArrays
     autopilot: CycleArrays
@@ -111,10 +103,8 @@ def run(steps: Steps, arrays: Callable[[int], TickArrays]) -> Callable[[int, int
                 end = begin_tick(a)
                 if end != LAWS:
                     return done, end
-                control_all(
-                    *(a.position, a.attitude, a.arm, a.reference.memory[0].period),
-                    *(a.counts[STAMP], a.state, a.flown, a.inputs),
-                )
+                if not control_all(a.laws, a.counts[STAMP], a.state, a.flown, a.inputs):
+                    return done, LAWS
                 end = decide(a)
                 if end != RECORD:
                     return done, end
@@ -180,11 +170,11 @@ def begin_tick(a: TickArrays) -> int:
 @inlined
 def decide(a: TickArrays) -> int:
     """Do the stages bridge and next reference; return RECORD, or where they end."""
-    c, m = a.counts, a.sensing.memory[0]
-    stamp, tau_p, tau_q = c[STAMP], a.position.law.tau, a.attitude.law.tau
+    c, m, laws = a.counts, a.sensing.memory[0], a.laws
+    stamp, tau_p, tau_q = c[STAMP], laws.position.all.tau, laws.attitude.all.tau
     time = m.tick * m.period
     if not send(
-        *(a.bridge, stamp, time, a.state, tau_p, tau_q, a.position.attitude, a.inputs),
+        *(a.bridge, stamp, time, a.state, tau_p, tau_q, laws.position.attitude, a.inputs),
     ):
         return BRIDGE
     c[SENT] = 1
@@ -197,13 +187,14 @@ def decide(a: TickArrays) -> int:
 def end_tick(a: TickArrays) -> int:
     """Record the tick, run the autopilot and the physics; return END, or where they end."""
     c, s, m, bridge = a.counts, a.sensing, a.sensing.memory[0], a.bridge.memory[0]
+    position, attitude, arm = a.laws.position, a.laws.attitude, a.laws.arm
     time = m.tick * m.period
     magnet = 1.0 if a.magnet[0] else 0.0
     stamp = c[STAMP] / SECOND - m.period / 2.0
     c[FIRST] = record(
         *(a.table, c[ROW], a.ring, c[FIRST], c[NEXT], time, a.motors, magnet, stamp),
-        *(a.reference.memory[0].begun, a.state, a.flown, a.position.attitude),
-        *(a.position.law.tau, a.attitude.law.tau, a.arm.law.tau, a.bridge.rates, bridge.sent),
+        *(a.reference.memory[0].begun, a.state, a.flown, position.attitude),
+        *(position.all.tau, attitude.all.tau, arm.all.tau, a.bridge.rates, bridge.sent),
         *(bridge.used, a.layout),
     )
     c[NEXT] += 1
@@ -212,5 +203,5 @@ def end_tick(a: TickArrays) -> int:
     if not cycle(a.autopilot, a.bridge, time, sample[0:3], sample[3:6]):
         return AUTOPILOT
     c[CYCLES] += 1
-    c[FAULT] = step(s, a.motors, a.arm.command, a.magnet[0])
+    c[FAULT] = step(s, a.motors, arm.command, a.magnet[0])
     return ERROR if c[FAULT] else END

@@ -21,13 +21,7 @@ from uam_lab.flights.direct.record import TickRecorder
 from uam_lab.flights.direct.steady.bridge import BridgePart
 from uam_lab.flights.direct.steady.cycle import CyclePart
 from uam_lab.flights.direct.steady.inputs import InputsPart
-from uam_lab.flights.direct.steady.laws import (
-    ArmPart,
-    AttitudePart,
-    LawPart,
-    attitude_arrays,
-    position_arrays,
-)
+from uam_lab.flights.direct.steady.laws import law_arrays
 from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
 from uam_lab.flights.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
 from uam_lab.flights.direct.steady.reference import ReferencePart
@@ -77,17 +71,11 @@ class SteadyTicks:
         self.able = self._sensing.able() and self._bridge.able()
         if not self.able:
             return
-        laws = (stages.position, stages.attitude, stages.arm)
-        self._steps = tuple(type(one.controller.law).step for one in laws)
+        self._controllers = [one.controller for one in stages.laws.values()]
+        self._steps = tuple(type(one.law).step for one in self._controllers)
         if not all(map(counts_references, self._steps)):  # a law of somebody's own
             self.able = False
             return
-        self._laws = (
-            LawPart(stages.position),
-            AttitudePart(stages.attitude, stages.measured_delay),
-            ArmPart(stages.arm),
-        )
-        self._controllers = [part.stage.controller for part in self._laws]
         self._inputs = InputsPart(stages.mission.inputs, self._controllers, plant.joints)
         self._reference = ReferencePart(stages.mission)
         self._cycle = CyclePart(flight.autopilot)
@@ -145,8 +133,7 @@ class SteadyTicks:
         report, stamp = self._bridge.report(), self._counts.item(STAMP)
         if report is not None:
             self._inputs.report(stamp, (report.round_trip, report.loop_delay))
-            if not self._laws[1].report(stamp, report.loop_delay):
-                return -1
+            self._flight.control.measured_delay.report(stamp, report.loop_delay)
         most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
         most = min(most, self._sensing.renew(), self._ticks_to_report(stamp))
         return self._reference.renew(self._flight.control.signals.state, most)
@@ -174,7 +161,6 @@ class SteadyTicks:
             and self._cycle.load()
             and not stages.estimator.held_back
             and self._inputs.load()
-            and all(part.load() for part in self._laws)
         )
         if not steady:
             return -1
@@ -189,7 +175,7 @@ class SteadyTicks:
         flight, stages = self._flight, self._flight.control
         made = (
             flight.recorder.table.values,
-            *(one.parameters for one in self._controllers),
+            *(one.arrays for one in self._controllers),
             *(stages.bridge.map._flat, flight.autopilot.autopilot._loop),
             *(stages.mission.mission._guidance, stages.mission.mission._parameters),
         )
@@ -201,9 +187,7 @@ class SteadyTicks:
                 self._sensing.arrays,
                 stages.estimator.arrays,
                 self._inputs.arrays,
-                position_arrays(self._laws[0]),
-                attitude_arrays(self._laws[1]),
-                self._laws[2].arm_arrays(),
+                law_arrays(stages),
                 self._bridge.arrays(),
                 self._reference.arrays(),
                 self._cycle.arrays(),
@@ -233,8 +217,6 @@ class SteadyTicks:
         observed = end != END
         self._sensing.store(observed)
         self._inputs.store()
-        for part in self._laws:
-            part.store()
         self._reference.store(signals.state)
         self._bridge.store(signals.state, stamp / SECOND, bool(sent))
         newest = plant.tick if observed else plant.tick - 1
