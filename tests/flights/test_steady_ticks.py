@@ -21,6 +21,7 @@ from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.plant import PhysicsError, Vehicle
 from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.sensors import VEHICLE_POSE, WAITING
 
 GUSTS = {"wind": [1.0, 0.5, 0.0], "gust": 1.0}
 
@@ -111,18 +112,24 @@ def test_it_may_change_between_both_at_any_tick(stretches, seed):
     assert_same(mixed, objects)
 
 
+def waiting_poses(one):
+    """Return the poses that have not arrived, views."""
+    a = one.plant.arrays.mocap
+    first, count = a.first[VEHICLE_POSE], a.count[VEHICLE_POSE]
+    assert count > 1
+    return [a.poses[VEHICLE_POSE, (first + i) % WAITING] for i in range(count)]
+
+
 def late_poses(one):
     """Move the next pose by a metre: the estimator refuses it."""
-    due, (stamp, position, quaternion) = one.plant._mocap_delay.queue.pop()
-    one.plant._mocap_delay.queue.append((due, (stamp, position + 1.0, quaternion)))
+    waiting_poses(one)[-1][1:4] += 1.0
 
 
 def frozen_poses(one):
     """Let all poses of a moment be the same: a frozen tracker."""
-    queue = one.plant._mocap_delay.queue
-    _, first = queue[0]
-    for i, (due, sample) in enumerate(list(queue)):
-        queue[i] = due, (sample[0], *first[1:])
+    first, *others = waiting_poses(one)
+    for pose in others:
+        pose[1:] = first[1:]
 
 
 def broken_estimate(one):
@@ -132,7 +139,7 @@ def broken_estimate(one):
 
 def storm(one):
     """Blow the vehicle away: limits are exceeded."""
-    one.plant._wind_mean[:] = 14.0, 0.0, 0.0
+    one.plant.arrays.physics.wind_mean[:] = 14.0, 0.0, 0.0
 
 
 def hold(one):

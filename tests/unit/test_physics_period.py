@@ -24,11 +24,12 @@ VEHICLES = {name: Vehicle.of(load_description(name)) for name in ("s500_arm3", "
 
 def one_by_one(plant, motors, effort, magnet):
     """As `MujocoPlant.step`, with MuJoCo's own step."""
-    begin_period(plant._arrays, effort, magnet, np.zeros(3), plant.tick)
-    for _ in range(plant._steps):
-        actuate(plant._arrays, motors)
+    arrays, steps = plant.arrays.physics, plant.memory["steps"].item()
+    begin_period(arrays, effort, magnet, np.zeros(3), plant.tick)
+    for _ in range(steps):
+        actuate(arrays, motors)
         mujoco.mj_step(plant.model, plant.data)
-        average(plant._arrays, 1.0 / plant._steps)
+        average(arrays, 1.0 / steps)
     plant.tick += 1
 
 

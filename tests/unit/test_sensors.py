@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 
 from uam_sim_bridge.plant.sensors import (
+    PAYLOAD_POSE,
+    VEHICLE_POSE,
     Delay,
     Encoders,
     Imu,
     Mocap,
     Noise,
-    SampleRows,
     disturbed,
     generators,
     quantised,
+    receive_poses,
+    send_pose,
+    take_poses,
 )
 
 
@@ -69,29 +73,42 @@ def test_imu_adds_bias_and_noise_of_each_axis():
     np.testing.assert_array_equal(force, [68.0, 73.0, 78.0])
 
 
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 MOCAP = {"rate": 4.0, "position_noise": 0.5, "attitude_noise": 1e-3}
 
 
+def rig(scale=1.0, **numbers):
+    mocap = Mocap(MOCAP | numbers, scale, (Counting(), Counting()), payload_top=2.0)
+    mocap.draw()
+    return mocap
+
+
+def due(mocap, time):
+    return take_poses(mocap.arrays, time, np.zeros(3), LEVEL, np.array([1.0, 2.0, 3.0, *LEVEL]))
+
+
 def test_mocap_adds_noise_to_position_and_a_turn_in_the_body_to_attitude():
-    mocap = Mocap(MOCAP, 2.0, Counting())
-    position, quaternion = mocap.sample(
-        np.array([10.0, 20.0, 30.0]), np.array([0.0, 0.0, 0.0, 1.0])
-    )
+    mocap = rig(2.0)
+    half_turn = np.array([0.0, 0.0, 0.0, 1.0])
+    assert take_poses(mocap.arrays, 0.0, np.array([10.0, 20.0, 30.0]), half_turn, np.zeros(7))
+    stamp, position, quaternion = mocap.taken(VEHICLE_POSE)
+    assert stamp == 0.0
     np.testing.assert_array_equal(position, [11.0, 22.0, 33.0])
     # turn by (8, 10, 12) mrad after the half turn about z: k (1 + i a + j b + k c)
     angle = 1e-3 * math.sqrt(64.0 + 100.0 + 144.0)
     s = math.sin(angle / 2.0) / angle * 1e-3
     expected = [-12.0 * s, -10.0 * s, 8.0 * s, math.cos(angle / 2.0)]
     np.testing.assert_allclose(quaternion, expected, rtol=1e-12)
-    position, _ = mocap.sample(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    assert due(mocap, 1.0)
+    _, position, _ = mocap.taken(VEHICLE_POSE)
     np.testing.assert_array_equal(position, [7.0, 8.0, 9.0])  # of the next row
 
 
 def test_mocap_exposes_at_its_rate_and_not_late_by_rounding():
-    mocap = Mocap(MOCAP, 1.0, Counting())
+    mocap = rig()
     times = [0.0, 0.0, 0.2, 0.25 - 1e-9, 0.3, 0.5 - 1e-8, 0.5 - 5e-10, 0.6, 0.75, 1.0]
-    due = [True, False, False, True, False, False, True, False, True, True]
-    assert [mocap.due(time) for time in times] == due
+    expected = [True, False, False, True, False, False, True, False, True, True]
+    assert [due(mocap, time) for time in times] == expected
 
 
 def test_a_delay_hands_out_one_sample_when_it_is_due():
@@ -125,23 +142,35 @@ def test_a_sample_may_be_later_than_usual_and_none_overtakes_it():
     assert [line(*one) for one in given] == [None, None, None, ("a",), ("b",)]
 
 
+def test_a_pose_may_be_later_than_usual_and_none_overtakes_it():
+    mocap, got = rig(), []
+    for tick, late in enumerate((3, 0, None, None, None, None)):
+        assert due(mocap, float(tick))
+        if late is not None:
+            send_pose(mocap.arrays, VEHICLE_POSE, tick + 2 + late)
+        receive_poses(mocap.arrays, tick)
+        got.append(mocap.arrived(VEHICLE_POSE))
+    assert [one and one[0] for one in got] == [None] * 5 + [0.0]
+    receive_poses(mocap.arrays, 5)
+    assert mocap.arrived(VEHICLE_POSE)[0] == 1.0 and mocap.arrived(PAYLOAD_POSE) is None
+    receive_poses(mocap.arrays, 6)
+    assert mocap.arrived(VEHICLE_POSE) is None
+
+
+def test_the_pose_of_the_payload_is_that_of_its_grip_point():
+    mocap = rig(payload=True)
+    assert due(mocap, 0.0)
+    send_pose(mocap.arrays, PAYLOAD_POSE, 0)
+    receive_poses(mocap.arrays, 0)
+    _, position, _ = mocap.arrived(PAYLOAD_POSE)
+    np.testing.assert_array_equal(position, [1.5, 3.0, 6.5])  # noise 1, 2, 3, halved
+
+
 def test_mocap_of_a_plant_that_begins_later_keeps_its_rate_from_there():
-    mocap = Mocap(MOCAP, 1.0, Counting())
+    mocap = rig()
     # 10.1 is more than a period behind the first pose; 0.25 exactly one is not
-    assert [mocap.due(t) for t in (10.1, 10.2, 10.35, 10.5, 10.6)] == [
+    assert [due(mocap, t) for t in (10.1, 10.2, 10.35, 10.5, 10.6)] == [
         True, False, True, False, True,
     ]  # fmt: skip
-    mocap = Mocap(MOCAP, 1.0, Counting())
-    assert [mocap.due(t) for t in (0.25, 0.25, 0.5)] == [True, True, True]
-
-
-def test_rows_of_samples_go_with_the_sequence_of_the_noise():
-    ticks = 600
-    rows = SampleRows(Noise(np.random.default_rng(3), np.ones(6)), 2)
-    taken = [rows() for _ in range(ticks)]
-    noise = np.array([one[0] for one in taken])
-    np.testing.assert_array_equal(noise, np.random.default_rng(3).standard_normal((ticks, 6)))
-    _, row, *parts = taken[-1]
-    row[:] = np.arange(12.0)
-    expected = [[0, 1, 2], [3, 4, 5], [6, 7], [8, 9], [10, 11]]
-    assert [part.tolist() for part in parts] == expected
+    mocap = rig()
+    assert [due(mocap, t) for t in (0.25, 0.25, 0.5)] == [True, True, True]

@@ -8,32 +8,51 @@ import mujoco
 import numpy as np
 
 from uam_control.maths.compiled import prepared
+from uam_control.maths.memory import Number, record
 from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.magnet import magnet_constants
-from uam_sim_bridge.plant.observation import Observed, observe, write_grip, write_truth
+from uam_sim_bridge.plant.observation import Observed, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
-from uam_sim_bridge.plant.physics import (
-    PhysicsArrays,
-    actuate,
-    average,
-    begin_period,
-    step_period,
-)
+from uam_sim_bridge.plant.physics import PhysicsArrays, actuate, average, begin_period
 from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, SampleRows, generators
+from uam_sim_bridge.plant.plant_tick import (
+    REAL,
+    WHOLE,
+    PlantArrays,
+    sense,
+    step,
+    take_due_poses,
+    take_samples,
+)
+from uam_sim_bridge.plant.sensors import (
+    BLOCK,
+    PAYLOAD_POSE,
+    VEHICLE_POSE,
+    Encoders,
+    Imu,
+    Mocap,
+    Noise,
+    generators,
+    receive_poses,
+    send_pose,
+)
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
 STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's solimp
 
 
 class MujocoPlant(Plant):
-    """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/."""
+    """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/.
+
+    `arrays`: all that compiled functions use, never replaced.
+    """
 
     HAS_EFFECTS = True
+    tick, magnet_gain, gusty, imu_late, joints_late = (Number() for _ in range(5))
 
     def __init__(
         self,
@@ -45,6 +64,7 @@ class MujocoPlant(Plant):
     ) -> None:
         """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,) [rad]: joint angles on
         the ground, empty: stowed as described; disturbed: `disturb` will be called."""
+        self.memory = record(WHOLE, REAL)
         super().__init__(vehicle)
         numbers = vehicle.numbers
         self.model = model = vehicle.compile(payload_mass, add_to if disturbed else None)
@@ -56,14 +76,9 @@ class MujocoPlant(Plant):
         imu_noise, mocap_noise, gusts, payload_noise = generators(seed, 4)
         sensors = numbers["sensors"]
         self._imu = Imu(sensors["imu"], scale, imu_noise)
-        self._mocap = Mocap(sensors["mocap"], scale, mocap_noise)
-        self._tracks_payload = sensors["mocap"].get("payload", False)
-        self._payload_mocap = Mocap(sensors["mocap"], scale, payload_noise)
+        noises = mocap_noise, payload_noise
+        self._mocap = Mocap(sensors["mocap"], scale, noises, self._payload_top)
         self._encoders = Encoders(sensors["joints"])
-        self._rows = SampleRows(self._imu.noise, self.joints)
-        self._imu_delay, self._mocap_delay, self._joints_delay, self._payload_delay = (
-            Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints", "mocap")
-        )
 
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
         self.servos = Servos(numbers["servos"], self._alpha)
@@ -72,9 +87,9 @@ class MujocoPlant(Plant):
         self._wind_mean = np.array(air["wind"], dtype=float)
         self.wind = self._wind_mean.copy()
         keep = np.exp(-self.period / air["gust_time"])
-        self._gust_keep, self._still = np.array([keep]), np.zeros(3)
+        self._gust_keep = np.array([keep])
         spread = air["gust"] * np.sqrt(1.0 - keep**2)
-        self._gust = Noise(gusts, np.full(3, spread)) if air["gust"] else None
+        self._gust = Noise(gusts, np.full(3, spread))
 
         mujoco.mj_forward(model, data)
         self._specific_force = self._sensed_force.copy()
@@ -85,15 +100,13 @@ class MujocoPlant(Plant):
         effects = numbers["effects"]
         self._effects = ActingEffects(effects, self._bench(), seed) if effects else None
         self._rotor_factor = self.rotors.efficiency.copy()  # with the faults, without the effects
-        self._arrays, self._observed = self._physics_arrays(), self._observed_arrays()
-        self._addresses = model._address, data._address
         self._unused_truth = np.empty(self.truth_row.width)
-        self._prepare()
+        self._prepare(air["gust"] > 0.0)
         self._undisturbed = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
             model.dof_solimp[self._arm_dofs].copy(),
-            self._magnet_gain,
+            self.magnet_gain,
         )
 
     def _lay_out(self, payload_mass: float, arm_start: Sequence[float]) -> None:
@@ -123,7 +136,7 @@ class MujocoPlant(Plant):
         self._thrust_control = self._controls(described.rotor_names)
         self._torque_control = self._controls(names)
         self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
-        self._magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
+        self.magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
         self._magnet_control = self._controls((MAGNET,))
         self._face = data.site_xpos[self.model.site("magnet_face").id]
         # of the same instant as the face: qpos is a physics step later
@@ -191,17 +204,29 @@ class MujocoPlant(Plant):
             swing=self._swing_angle,
         )
 
-    def _prepare(self) -> None:
-        """Look up the machine code of what each tick calls."""
-        arrays, observed, at = self._arrays, self._observed, self.truth_row
-        motors, arm, noise = (np.empty(size) for size in (self.rotors.speed.size, self.joints, 6))
-        samples, pose = np.empty(6 + 3 * self.joints), self._payload_pose
-        self._step_period = prepared(
-            step_period, arrays, motors, arm, True, noise, 0, *self._addresses, self._steps
+    def _prepare(self, gusty: bool) -> None:
+        """Collect the arrays; look up the machine code of what each tick calls."""
+        sensors, motors = self.vehicle.numbers["sensors"], np.empty(self.rotors.speed.size)
+        late = [sensors[name]["latency_ticks"] for name in ("imu", "joints")]
+        addresses = self.model._address, self.data._address
+        self.memory[0] = (
+            *(self.tick, self._steps, *addresses, gusty, *late),
+            *(self.period, self.magnet_gain),
         )
-        self._observe = prepared(observe, observed, noise, samples, 1.0, at, self._unused_truth)
-        self._write_truth = prepared(write_truth, observed, 1.0, at, self._unused_truth)
-        self._write_grip = prepared(write_grip, pose, self._payload_top, pose)
+        self.arrays = a = PlantArrays(
+            *(self._physics_arrays(), self._observed_arrays(), self.truth_row),
+            *(self._imu.noise.arrays, self._gust.arrays, self._mocap.arrays),
+            np.zeros((max(late) + 1, 6 + 3 * self.joints)),
+            np.full(max(late) + 1, np.iinfo(np.int64).min),
+            self.memory,
+        )
+        truth = self._unused_truth
+        self._sense, self._take_samples = (
+            prepared(sense, a, truth),
+            prepared(take_samples, a, truth),
+        )
+        self._step = prepared(step, a, motors, np.empty(self.joints), True)
+        self._write_truth = prepared(write_truth, a.observed, 1.0, a.truth, truth)
 
     def _bench(self) -> Bench:
         """Return the parts on which effects act."""
@@ -238,55 +263,74 @@ class MujocoPlant(Plant):
 
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`."""
-        tick, time = self.tick, self.tick * self.period
-        noise, samples, gyro, force, angles, speeds, torques = self._rows()
-        self._observe(self._observed, noise, samples, self._magnet_gain, self.truth_row, row)
-        effects = self._effects
-        if effects is not None:
-            gyro, force = effects.imu(gyro, force)
-        hil = (time, gyro, force)
-        mocap, payload, late = None, None, 0
-        if self._mocap.due(time):
-            mocap = (time, *self._mocap.sample(self._position, self._quaternion))
-            if self._tracks_payload:
-                payload = (time, *self._payload_mocap.sample(*self._grip_pose()))
-            if effects is not None:
-                mocap, late = effects.pose(mocap)
-        return Samples(
-            self._imu_delay(tick, hil),
-            self._joints_delay(tick, (time, angles, speeds, torques)),
-            self._mocap_delay(tick, mocap, late),
-            hil,
-            payload=self._payload_delay(tick, payload, late) if self._tracks_payload else None,
-        )
+        self.draw_noise()
+        if self._effects is None:
+            self._sense(self.arrays, row)
+        else:
+            self._take_samples(self.arrays, row)
+            self._affect(self._effects)
+            receive_poses(self.arrays.mocap, self.tick)
+        return self.arrived()
 
-    def _grip_pose(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return position (3,) [m] of the middle of the payload's upper side, and quaternion."""
-        point = np.empty(3)
-        self._write_grip(self._payload_pose, self._payload_top, point)
-        return point, self._payload_quaternion
+    @property
+    def compiled(self) -> bool:
+        """Whether `sense` and `step` of `plant_tick` are all that a tick does."""
+        return self._effects is None and self._hinge is None
+
+    def draw_noise(self) -> int:
+        """Draw the noise that is due; return for how many ticks it lasts at least."""
+        poses = self._mocap.draw()
+        lasts = max(poses, int((poses - 1) * self._mocap.period / self.period))
+        gusts = self._gust.draw() if self.gusty else BLOCK
+        return min(self._imu.noise.draw(), lasts, gusts)
+
+    def _affect(self, effects: ActingEffects) -> None:
+        """Let the effects act on the samples of this tick, and take its poses."""
+        a, mocap = self.arrays, self._mocap
+        row = a.samples[self.tick % len(a.samples)]
+        sample = row.copy()
+        row[0:3], row[3:6] = effects.imu(sample[0:3], sample[3:6])
+        if not take_due_poses(a):
+            return
+        pose, late = effects.pose(mocap.taken(VEHICLE_POSE))
+        due = self.tick + mocap.ticks + late
+        if pose is not None:
+            a.mocap.taken[VEHICLE_POSE] = pose[0], *pose[1], *pose[2]
+            send_pose(a.mocap, VEHICLE_POSE, due)
+        if mocap.tracks:
+            send_pose(a.mocap, PAYLOAD_POSE, due)
+
+    def arrived(self) -> Samples:
+        """Return the samples that have arrived at this tick, as copies."""
+        tick, n, taken = self.tick, self.joints, self.tick - self.joints_late
+        hil, joints = self.imu(tick), self._sample(taken)
+        imu = self.imu(tick - self.imu_late) if self.imu_late else hil
+        if joints is not None:
+            parts = joints[6 : 6 + n], joints[6 + n : 6 + 2 * n], joints[6 + 2 * n :]
+            joints = (taken * self.period, *parts)
+        mocap, payload = map(self._mocap.arrived, (VEHICLE_POSE, PAYLOAD_POSE))
+        return Samples(imu, joints, mocap, hil, payload=payload)
+
+    def imu(self, tick: int) -> tuple[float, np.ndarray, np.ndarray] | None:
+        """Return stamp [s], gyro and specific force (3,) of the sample taken at `tick`, a copy."""
+        sample = self._sample(tick)
+        return None if sample is None else (tick * self.period, sample[0:3], sample[3:6])
+
+    def _sample(self, tick: int) -> np.ndarray | None:
+        a, row = self.arrays, tick % len(self.arrays.samples)
+        return a.samples[row].copy() if tick == a.taken.item(row) else None
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
+        self.draw_noise()
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
-        gust = self._still if self._gust is None else self._gust()
-        if self._effects is None:
-            error = self._step_period(
-                self._arrays,
-                motor_commands,
-                arm_command,
-                magnet,
-                gust,
-                self.tick,
-                *self._addresses,
-                self._steps,
-            )
-            if error:
-                raise PhysicsError(f"MuJoCo: {error_text(error)}")
-        else:
-            self._step_with_effects(self._effects, motor_commands, arm_command, magnet, gust)
-        self.tick += 1
+        if self._effects is not None:
+            self._step_with_effects(self._effects, motor_commands, arm_command, magnet)
+            return
+        error = self._step(self.arrays, motor_commands, arm_command, magnet)
+        if error:
+            raise PhysicsError(f"MuJoCo: {error_text(error)}")
 
     def _step_with_effects(
         self,
@@ -294,10 +338,10 @@ class MujocoPlant(Plant):
         motor_commands: np.ndarray,
         arm_command: np.ndarray,
         magnet: bool,
-        gust: np.ndarray,
     ) -> None:
         """Advance one control period; effects act between its parts."""
-        arrays = self._arrays
+        arrays = self.arrays.physics
+        gust = self._gust() if self.gusty else np.zeros(3)
         begin_period(arrays, arm_command, magnet, gust, self.tick)
         effects.tick()
         np.multiply(self._rotor_factor, effects.bench.lift, out=self.rotors.efficiency)
@@ -310,6 +354,7 @@ class MujocoPlant(Plant):
             except mujoco.FatalError as fatal:
                 raise PhysicsError(f"MuJoCo: {' '.join(str(fatal).split())}") from None
             average(arrays, 1.0 / self._steps)
+        self.tick += 1
 
     def disturb(self, disturbance: Disturbance) -> None:
         """See `Plant.disturb`."""
@@ -320,8 +365,8 @@ class MujocoPlant(Plant):
         braked = disturbance.joint_friction > 0.0
         model.dof_frictionloss[dofs] = friction + disturbance.joint_friction
         model.dof_solimp[dofs, 0:2] = np.where(braked[:, None], STIFF, softness[:, 0:2])
-        self._magnet_gain = gain * disturbance.magnet_part
-        model.actuator_gainprm[model.actuator(MAGNET).id, 0] = self._magnet_gain
+        self.magnet_gain = gain * disturbance.magnet_part
+        model.actuator_gainprm[model.actuator(MAGNET).id, 0] = self.magnet_gain
         change = disturbance.wind - self._added_wind
         self.wind += change
         self._wind_mean += change
@@ -347,7 +392,7 @@ class MujocoPlant(Plant):
     def truth(self) -> Truth:
         """See `Plant.truth`."""
         at, row = self.truth_row, np.empty(self.truth_row.width)
-        self._write_truth(self._observed, self._magnet_gain, at, row)
+        self._write_truth(self.arrays.observed, self.magnet_gain, at, row)
         return Truth(
             row[: at.rotor_thrust].reshape(3, -1),
             self._quaternion.copy(),

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
+from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.plant import TruthRow
 from uam_sim_bridge.plant.sensors import disturbed, quantised
 
@@ -51,7 +51,7 @@ def observe(
     at: TruthRow,
     truth: np.ndarray,
 ) -> None:
-    """Write the samples of IMU and joints, see `SampleRows`, and the true values of a tick.
+    """Write the samples of IMU and joints, see `SensorArrays`, and the true values of a tick.
 
     noise (6,): of the IMU; samples (6 + 3 n,); magnet_gain, at, truth: of `write_truth`.
     """
@@ -91,14 +91,3 @@ def write_state(o: Observed, state: np.ndarray) -> None:
     for i in range(len(o.alpha)):
         state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = o.alpha[i], o.alpha_dot[i]
         state[CHI_DDOT, ALPHA + i] = o.alpha_ddot[i]
-
-
-@jit
-def write_grip(pose: np.ndarray, height: float, point: np.ndarray) -> None:
-    """Write the point (3,) [m, world] at `height` [m] on the vertical axis of a body.
-
-    pose (7,): position [m] and quaternion [w x y z] of the body.
-    """
-    matrix = matrix_from_quaternion(pose[3:])
-    for i in range(3):
-        point[i] = pose[i] + height * matrix[i, 2]

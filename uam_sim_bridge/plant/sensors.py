@@ -3,41 +3,63 @@
 from __future__ import annotations
 
 from collections import deque
-from itertools import pairwise
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit, prepared
-from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.memory import Flag, Number, put, record
+from uam_control.maths.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_rotation_vector,
+    quaternion_multiply,
+)
 
 BLOCK = 256  # noise samples drawn per call of the generator; the sequence is the same for any
+
+
+class NoiseArrays(NamedTuple):
+    """rows (BLOCK, width): the present block of a `Noise`; numbers (1,): how many are used."""
+
+    rows: np.ndarray
+    numbers: np.ndarray
 
 
 class Noise:
     """White noise with given standard deviations (width,), drawn in blocks; (width,) per call.
 
-    `rows` (BLOCK, width): the present block; `used`: how many of them were returned.
+    `arrays`: never replaced; compiled functions take a row by `next_row` after `draw`.
     """
 
+    used = Number()
+
     def __init__(self, generator: np.random.Generator, deviations: np.ndarray) -> None:
-        self._generator = generator
-        self._deviations = deviations
-        self.rows = np.empty((BLOCK, len(deviations)))
+        self._generator, self._deviations = generator, deviations
+        self.memory = record("used")
         self.used = BLOCK
+        self.arrays = NoiseArrays(np.zeros((BLOCK, len(deviations))), self.memory)
 
     def __call__(self) -> np.ndarray:
         self.draw()
-        row = self.rows[self.used]
         self.used += 1
-        return row
+        return self.arrays.rows[self.used - 1].copy()
 
-    def draw(self) -> bool:
-        """Draw the next block if the present one is used up; return whether it was."""
-        if self.used < BLOCK:
-            return False
-        self.rows = self._generator.standard_normal(self.rows.shape) * self._deviations
-        self.used = 0
-        return True
+    def draw(self) -> int:
+        """Draw the next block if the present one is used up; return how many rows are left."""
+        if self.used == BLOCK:
+            rows = self.arrays.rows
+            rows[:] = self._generator.standard_normal(rows.shape) * self._deviations
+            self.used = 0
+        return BLOCK - self.used
+
+
+@borrowing
+def next_row(noise: NoiseArrays) -> int:
+    """Use the next row of a noise; return its number."""
+    m = noise.numbers[0]
+    m.used += 1
+    return m.used - 1
 
 
 class Delay:
@@ -75,32 +97,125 @@ class Imu:
         self.noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
 
 
+class MocapArrays(NamedTuple):
+    """Of a `Mocap`. taken (2, POSE): newest pose of vehicle and payload, see `take_poses`; due (2,
+    WAITING) [ticks] and poses (2, WAITING, POSE): of those that have not arrived, in rings;
+    first, count, arrived (2,): of the rings; arrived: row of the pose of this tick, -1: none.
+    grip (3,) [m]: the payload's; numbers (1,): see REAL."""
+
+    noise: NoiseArrays
+    payload_noise: NoiseArrays
+    taken: np.ndarray
+    due: np.ndarray
+    poses: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    arrived: np.ndarray
+    grip: np.ndarray
+    numbers: np.ndarray
+
+
+POSE = 8  # stamp [s], position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU
+VEHICLE_POSE, PAYLOAD_POSE = range(2)
+WAITING = 512  # poses that have not arrived, at most: of two seconds
+# tracks: the payload, too; ticks: usual delay. next [s]: time of the next pose; payload_top [m]:
+# height of the grip point over the payload's middle
+WHOLE, REAL = "tracks ticks", "period next payload_top"
+
+
 class Mocap:
-    """OptiTrack: pose at its own rate."""
+    """OptiTrack: poses of vehicle and payload at its own rate. No pose overtakes another.
 
-    def __init__(self, numbers: dict, scale: float, generator: np.random.Generator) -> None:
-        """numbers: `sensors.mocap` of the vehicle; scale: factor on noise."""
-        self.period = 1.0 / numbers["rate"]
-        self.next = 0.0  # [s] of the next pose
+    `arrays`: never replaced; `tracks`, `ticks`, `period`: see WHOLE, REAL.
+    """
+
+    tracks, ticks, period = Flag(), Number(), Number()
+
+    def __init__(
+        self,
+        numbers: dict,
+        scale: float,
+        noises: Sequence[np.random.Generator],
+        payload_top: float = 0.0,
+    ) -> None:
+        """numbers: `sensors.mocap` of the vehicle; scale: factor on noise; noises: of vehicle and
+        payload; payload_top [m]: see REAL."""
         deviations = [numbers["position_noise"]] * 3 + [numbers["attitude_noise"]] * 3
-        self.noise = Noise(generator, scale * np.array(deviations))
-        any_length = np.empty(3)
-        self._noisy = prepared(noisy_pose, *(any_length,) * 5)
+        self.noises = [Noise(one, scale * np.array(deviations)) for one in noises]
+        self.memory = record(WHOLE, REAL)
+        tracks, ticks = numbers.get("payload", False), numbers.get("latency_ticks", 0)
+        self.memory[0] = tracks, ticks, 1.0 / numbers["rate"], 0.0, payload_top
+        self.arrays = MocapArrays(
+            *(noise.arrays for noise in self.noises),
+            np.zeros((2, POSE)),
+            np.zeros((2, WAITING), dtype=np.int64),
+            np.zeros((2, WAITING, POSE)),
+            *np.zeros((3, 2), dtype=np.int64),
+            np.zeros(3),
+            self.memory,
+        )
 
-    def due(self, time: float) -> bool:
-        """Return whether mocap takes a pose at `time` [s]; call it once per tick."""
-        if time + 1e-9 < self.next:
-            return False
-        if time > self.next + self.period:  # the first tick of a plant that begins later
-            self.next = time
-        self.next += self.period
-        return True
+    def draw(self) -> int:
+        """Draw noise; return for how many poses it is left."""
+        return min(noise.draw() for noise in self.noises)
 
-    def sample(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, with noise."""
-        place, attitude = np.empty(3), np.empty(4)
-        self._noisy(position, quaternion, self.noise(), place, attitude)
-        return place, attitude
+    def arrived(self, body: int) -> tuple[float, np.ndarray, np.ndarray] | None:
+        """Return stamp [s], position, quaternion of a pose that arrives at this tick."""
+        row = self.arrays.arrived.item(body)
+        return None if row < 0 else _parts(self.arrays.poses[body, row])
+
+    def taken(self, body: int) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return stamp [s], position, quaternion of a newest pose."""
+        return _parts(self.arrays.taken[body])
+
+
+def _parts(pose: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    pose = pose.copy()
+    return pose.item(0), pose[1:4], pose[4:POSE]
+
+
+@borrowing
+def take_poses(
+    a: MocapArrays, time: float, position: np.ndarray, quaternion: np.ndarray, payload: np.ndarray
+) -> bool:
+    """Take the poses that are due at `time` [s], with noise; return whether one is.
+
+    position (3,), quaternion (4,): of the vehicle; payload (7,): both. Call it once per tick.
+    """
+    m = a.numbers[0]
+    if time + 1e-9 < m.next:
+        return False
+    if time > m.next + m.period:  # the first tick of a plant that begins later
+        m.next = time
+    m.next += m.period
+    taken = a.taken[VEHICLE_POSE]
+    taken[0], noise = time, a.noise.rows[next_row(a.noise)]
+    noisy_pose(position, quaternion, noise, taken[1:4], taken[4:POSE])
+    if m.tracks:
+        taken = a.taken[PAYLOAD_POSE]
+        taken[0], noise = time, a.payload_noise.rows[next_row(a.payload_noise)]
+        write_grip(payload, m.payload_top, a.grip)
+        noisy_pose(a.grip, payload[3:7], noise, taken[1:4], taken[4:POSE])
+    return True
+
+
+@borrowing
+def send_pose(a: MocapArrays, body: int, due: int) -> None:
+    """Let a newest pose, VEHICLE_POSE or PAYLOAD_POSE, arrive at the tick `due`."""
+    row = (a.first[body] + a.count[body]) % WAITING
+    a.due[body, row] = due
+    put(a.taken[body], a.poses[body, row])
+    a.count[body] += 1
+
+
+@borrowing
+def receive_poses(a: MocapArrays, tick: int) -> None:
+    """Write which poses arrive at `tick`."""
+    for body in range(2):
+        row, a.arrived[body] = a.first[body], -1
+        if a.count[body] and a.due[body, row] <= tick:
+            a.arrived[body], a.first[body] = row, (row + 1) % WAITING
+            a.count[body] -= 1
 
 
 class Encoders:
@@ -109,30 +224,6 @@ class Encoders:
     def __init__(self, numbers: dict) -> None:
         """numbers: `sensors.joints` of the vehicle."""
         self.units = np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
-
-
-class SampleRows:
-    """For each tick: noise of the IMU (6,), row of its samples (6 + 3 n,), and its parts.
-
-    The parts are views: gyro, specific force (3,), angles, velocities, torques (n,). A row is
-    written once and never again: whoever has a sample may keep it.
-    """
-
-    def __init__(self, noise: Noise, joints: int) -> None:
-        """noise: of `Imu`."""
-        self._noise, self._edges = noise, np.cumsum([0, 3, 3, joints, joints, joints])
-        self._block: np.ndarray | None = None  # of the noise, to which the parts belong
-        self._parts: list[tuple[np.ndarray, ...]] = []
-
-    def __call__(self) -> tuple[np.ndarray, ...]:
-        noise = self._noise
-        noise.draw()
-        if self._block is not noise.rows:
-            rows = np.empty((BLOCK, self._edges[-1]))
-            views = (rows[:, a:b] for a, b in pairwise(self._edges))
-            self._block, self._parts = noise.rows, list(zip(noise.rows, rows, *views, strict=True))
-        noise.used += 1
-        return self._parts[noise.used - 1]
 
 
 @jit
@@ -151,6 +242,17 @@ def disturbed(
     for i in range(3):
         gyro[i] = rates[i] + noise[i] + bias[i]
         accelerometer[i] = specific_force[i] + noise[3 + i] + bias[3 + i]
+
+
+@jit
+def write_grip(pose: np.ndarray, height: float, point: np.ndarray) -> None:
+    """Write the point (3,) [m, world] at `height` [m] on the vertical axis of a body.
+
+    pose (7,): position [m] and quaternion [w x y z] of the body.
+    """
+    matrix = matrix_from_quaternion(pose[3:])
+    for i in range(3):
+        point[i] = pose[i] + height * matrix[i, 2]
 
 
 @jit

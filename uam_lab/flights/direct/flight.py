@@ -169,7 +169,7 @@ class DirectFlight:
         now, magnet = plant.time, control.signals.magnet
         samples = plant.observe(self.recorder.truth())
         self.autopilot.time = now
-        self._record(now, magnet, control.tick(*self._delivered(samples)))
+        self._record(now, magnet, control.tick(*self.delivered(samples)))
         self._end_tick(samples.hil)
 
     def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
@@ -197,7 +197,7 @@ class DirectFlight:
         motors = self.autopilot.update(*hil)
         self.plant.step(motors, signals.arm_command, signals.magnet)
 
-    def _delivered(
+    def delivered(
         self, samples: Samples
     ) -> tuple[Pose | None, Joints | None, Imu | None, Pose | None]:
         """What the stages get of `samples`, with stamps [ns].

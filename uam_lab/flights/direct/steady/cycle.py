@@ -69,15 +69,14 @@ class CyclePart:
         """Return the arrays."""
         return CycleArrays(self._port.autopilot._loop, *self._port._own_sample, self.memory)
 
-    def store(self, sample: tuple[float, np.ndarray, np.ndarray]) -> None:
-        """Copy the state back after a cycle; sample: of that cycle."""
+    def store(self) -> None:
+        """Copy the state back after a cycle."""
         port, autopilot = self._port, self._port.autopilot
         newest, time, _, _, heartbeat, landed = self.memory[0].item()
         autopilot.estimator._newest, autopilot._time = newest, time
         autopilot.landing._since[:] = math.inf, math.inf, math.inf
         autopilot.imu = port._own_sample
         port._heartbeat_due, port._landed_due = heartbeat, landed
-        port._sample = sample
 
 
 @borrowing

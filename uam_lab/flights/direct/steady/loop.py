@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.estimation.estimator import write_biases
-from uam_control.maths.compiled import borrowing, inlined
+from uam_control.maths.compiled import borrowing, inlined, jit
 from uam_control.maths.memory import put
 from uam_control.stages import estimator_stage
 from uam_control.stages.estimator_stage import STATE, take_readings, take_sample
@@ -39,15 +39,8 @@ from uam_lab.flights.direct.steady.places import (
     WATCH,
 )
 from uam_lab.flights.direct.steady.reference import ReferenceArrays, advance, watch_due
-from uam_lab.flights.direct.steady.sensing import (
-    PAYLOAD_POSE,
-    RING,
-    VEHICLE_POSE,
-    Sensing,
-    sense,
-    stamp_of,
-    step,
-)
+from uam_sim_bridge.plant.plant_tick import PlantArrays, sense, step
+from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE
 
 
 class TickArrays(NamedTuple):
@@ -58,7 +51,7 @@ class TickArrays(NamedTuple):
     counts: see ROW to FAULT; magnet (1,): whether it is on.
     """
 
-    sensing: Sensing
+    plant: PlantArrays
     estimation: estimator_stage.StageArrays
     inputs: InputArrays
     laws: LawArrays
@@ -76,10 +69,10 @@ class TickArrays(NamedTuple):
     magnet: np.ndarray
 
 
-# entries of `counts`: row of the recording, ticks of its ring (first, next), slot of the pose that
-# arrives (-1: none), stamp [ns] of state and of the mission's begin (0: none), whether a setpoint
-# was sent, cycles of the autopilot, address of an error's text
-ROW, FIRST, NEXT, SLOT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(9)
+# entries of `counts`: row of the recording, ticks of its ring (first, next), stamp [ns] of state
+# and of the mission's begin (0: none), whether a setpoint was sent, cycles of the autopilot,
+# address of an error's text
+ROW, FIRST, NEXT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(8)
 
 
 @cache
@@ -119,21 +112,27 @@ def run(steps: Steps, arrays: Callable[[int], TickArrays]) -> Callable[[int, int
     return steady_run
 
 
+@jit
+def stamp_of(time: float) -> int:
+    """Return the stamp [ns] of a time [s]; see `nanoseconds`."""
+    return int(np.rint(time * 1e6)) * 1000
+
+
 @inlined
 def begin_tick(a: TickArrays) -> int:
     """Do the stages from the sensors to the mission; return LAWS, or where they end."""
-    s, c, i = a.sensing, a.counts, a.inputs
+    s, c, i = a.plant, a.counts, a.inputs
     rotors = len(a.motors)
     ring = a.ring[c[NEXT] % len(a.ring)]
     sense(s, ring[MOTORS + rotors :])
-    m = s.memory[0]
-    slot = c[SLOT] = m.pose
+    m, mocap = s.numbers[0], s.mocap
+    slot, payload_slot = mocap.arrived[VEHICLE_POSE], mocap.arrived[PAYLOAD_POSE]
     joints = s.observed.alpha.shape[0]
     at = m.tick - m.joints_late
-    row = s.samples[at % RING]
+    row = s.samples[at % len(s.samples)]
     joint_stamp = stamp_of(at * m.period)
     angles, speeds = row[6 : 6 + joints], row[6 + joints : 6 + 2 * joints]
-    pose = s.poses[max(slot, 0), VEHICLE_POSE]
+    pose = mocap.poses[VEHICLE_POSE, max(slot, 0)]
     position, quaternion, pose_stamp = pose[1:4], pose[4:8], -1
     if slot >= 0:
         pose_stamp = stamp_of(pose[0])
@@ -143,12 +142,12 @@ def begin_tick(a: TickArrays) -> int:
         put(pose[1:], i.mocap)
     i.kept[JOINTS], i.at[JOINTS] = True, joint_stamp
     put(row[6 + 2 * joints :], i.effort)
-    if slot >= 0 and m.tracks:
-        payload = s.poses[slot, PAYLOAD_POSE]
+    if payload_slot >= 0:
+        payload = mocap.poses[PAYLOAD_POSE, payload_slot]
         i.kept[PAYLOAD], i.at[PAYLOAD] = True, stamp_of(payload[0])
         put(payload[1:4], i.payload)
     at = m.tick - m.imu_late
-    sample, stamp = s.samples[at % RING], stamp_of(at * m.period)
+    sample, stamp = s.samples[at % len(s.samples)], stamp_of(at * m.period)
     if slot >= 0:
         estimator_stage.take_pose(a.estimation, pose_stamp, position, quaternion)
     take_readings(a.estimation, joint_stamp, angles, speeds)
@@ -170,7 +169,7 @@ def begin_tick(a: TickArrays) -> int:
 @inlined
 def decide(a: TickArrays) -> int:
     """Do the stages bridge and next reference; return RECORD, or where they end."""
-    c, m, laws = a.counts, a.sensing.memory[0], a.laws
+    c, m, laws = a.counts, a.plant.numbers[0], a.laws
     stamp, tau_p, tau_q = c[STAMP], laws.position.all.tau, laws.attitude.all.tau
     time = m.tick * m.period
     if not send(
@@ -186,7 +185,7 @@ def decide(a: TickArrays) -> int:
 @inlined
 def end_tick(a: TickArrays) -> int:
     """Record the tick, run the autopilot and the physics; return END, or where they end."""
-    c, s, m, bridge = a.counts, a.sensing, a.sensing.memory[0], a.bridge.memory[0]
+    c, s, m, bridge = a.counts, a.plant, a.plant.numbers[0], a.bridge.memory[0]
     position, attitude, arm = a.laws.position, a.laws.attitude, a.laws.arm
     time = m.tick * m.period
     magnet = 1.0 if a.magnet[0] else 0.0
@@ -199,7 +198,7 @@ def end_tick(a: TickArrays) -> int:
     )
     c[NEXT] += 1
     c[ROW] += 1
-    sample = s.samples[m.tick % RING]
+    sample = s.samples[m.tick % len(s.samples)]
     if not cycle(a.autopilot, a.bridge, time, sample[0:3], sample[3:6]):
         return AUTOPILOT
     c[CYCLES] += 1

@@ -16,7 +16,7 @@ from uam_control.stages.bridge_stage import BridgeStage
 from uam_control.stages.control_tick import STAGES, ControlTick, take_report
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stamps import SECOND, nanoseconds
+from uam_control.stamps import SECOND
 from uam_lab.flights.direct.record import TickRecorder
 from uam_lab.flights.direct.steady.bridge import BridgePart
 from uam_lab.flights.direct.steady.cycle import CyclePart
@@ -25,10 +25,9 @@ from uam_lab.flights.direct.steady.laws import law_arrays
 from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
 from uam_lab.flights.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
 from uam_lab.flights.direct.steady.reference import ReferencePart
-from uam_lab.flights.direct.steady.sensing import PAYLOAD_POSE, VEHICLE_POSE, SensingPart
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
-from uam_sim_bridge.plant import PhysicsError, Plant
+from uam_sim_bridge.plant import PhysicsError, Plant, Samples
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -45,6 +44,9 @@ class Flight(Protocol):
     autopilot_imu: bool
     recorder: TickRecorder
     say: Callable[[str], object]
+
+    def delivered(self, samples: Samples) -> tuple:
+        """Return the samples for the signals."""
 
     def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
         """Finish a tick that steady ticks have begun."""
@@ -67,8 +69,8 @@ class SteadyTicks:
         self.able = usual and type(port.autopilot) is Autopilot and not flight.autopilot_imu
         if not self.able:
             return
-        self._sensing, self._bridge = SensingPart(plant), BridgePart(stages.bridge)
-        self.able = self._sensing.able() and self._bridge.able()
+        self._bridge = BridgePart(stages.bridge)
+        self.able = plant.compiled and self._bridge.able()
         if not self.able:
             return
         self._controllers = [one.controller for one in stages.laws.values()]
@@ -79,7 +81,7 @@ class SteadyTicks:
         self._inputs = InputsPart(stages.mission.inputs, self._controllers, plant.joints)
         self._reference = ReferencePart(stages.mission)
         self._cycle = CyclePart(flight.autopilot)
-        self._counts, self._biases = np.zeros(9, dtype=np.int64), np.zeros((2, 3))
+        self._counts, self._biases = np.zeros(8, dtype=np.int64), np.zeros((2, 3))
         self._magnet = np.zeros(1, dtype=np.bool_)
         self._made: tuple = ()
         self._loop: Callable[[int, int], tuple[int, int]] | None = None
@@ -103,7 +105,7 @@ class SteadyTicks:
                 raise PhysicsError(f"MuJoCo: {error_text(self._counts.item(FAULT))}")
             begin = RECORD if end == WATCH else LISTEN
             if end not in (WATCH, END):
-                self._flight.finish(end, self._sensing.imu(self._flight.plant.tick))
+                self._flight.finish(end, self._flight.plant.imu(self._flight.plant.tick))
                 return flown + 1
         return flown
 
@@ -135,7 +137,7 @@ class SteadyTicks:
             self._inputs.report(stamp, (report.round_trip, report.loop_delay))
             self._flight.control.measured_delay.report(stamp, report.loop_delay)
         most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
-        most = min(most, self._sensing.renew(), self._ticks_to_report(stamp))
+        most = min(most, self._flight.plant.draw_noise(), self._ticks_to_report(stamp))
         return self._reference.renew(self._flight.control.signals.state, most)
 
     def _ticks_to_report(self, stamp: int) -> int:
@@ -164,10 +166,11 @@ class SteadyTicks:
         )
         if not steady:
             return -1
-        most = min(most, len(table.values) - table.count, self._sensing.load(half)) - half
+        left = self._flight.plant.draw_noise()
+        most = min(most, len(table.values) - table.count, left) - half
         most = min(most, self._ticks_to_report(signals.stamp))
         ring = recorder._first, recorder._next
-        self._counts[:] = table.count, *ring, -1, signals.stamp, *(0,) * 4
+        self._counts[:] = table.count, *ring, signals.stamp, *(0,) * 4
         return reference.load(signals.stamp, most) if most >= 0 else -1
 
     def _present(self) -> Callable[[int, int], tuple[int, int]]:
@@ -184,7 +187,7 @@ class SteadyTicks:
             self._made = made
             recorder = flight.recorder
             arrays = TickArrays(
-                self._sensing.arrays,
+                flight.plant.arrays,
                 stages.estimator.arrays,
                 self._inputs.arrays,
                 law_arrays(stages),
@@ -213,15 +216,14 @@ class SteadyTicks:
         """Copy the state back after a loop that ended in `end`."""
         flight, stages = self._flight, self._flight.control
         signals, plant, recorder = stages.signals, flight.plant, flight.recorder
-        row, first, following, slot, stamp, begun, sent, cycles, _ = self._counts.tolist()
+        row, first, following, stamp, begun, sent, cycles, _ = self._counts.tolist()
         observed = end != END
-        self._sensing.store(observed)
         self._inputs.store()
         self._reference.store(signals.state)
         self._bridge.store(signals.state, stamp / SECOND, bool(sent))
         newest = plant.tick if observed else plant.tick - 1
         if cycles:
-            self._cycle.store(self._sensing.imu(plant.tick - 1))
+            self._cycle.store()
         table = recorder.table
         table.phases[table.count : row] = table.phase_names[signals.phase]
         table.count = row
@@ -234,15 +236,5 @@ class SteadyTicks:
             signals.time = self._reference.begun(begun)
         signals.thrust_factor, signals.setpoint = stages.bridge.factor, stages.bridge._kept
         if observed:
-            signals.imu, signals.joints, signals.mocap, signals.payload = self._samples(slot)
-
-    def _samples(self, slot: int) -> tuple:
-        """Return the samples of IMU, joints, mocap and payload that have arrived at this tick."""
-        sensing, plant = self._sensing, self._flight.plant
-        found = [
-            sensing.imu(plant.tick - plant._imu_delay.ticks),
-            sensing.joints(plant.tick - plant._joints_delay.ticks),
-            None if slot < 0 else sensing.pose(slot, VEHICLE_POSE),
-            None if slot < 0 or not plant._tracks_payload else sensing.pose(slot, PAYLOAD_POSE),
-        ]
-        return tuple(one and (nanoseconds(one[0]), *one[1:]) for one in found)
+            found = flight.delivered(plant.arrived())
+            signals.mocap, signals.joints, signals.imu, signals.payload = found
