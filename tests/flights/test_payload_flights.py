@@ -27,7 +27,7 @@ def flight(scenario="quick_pick", payload=0.2, seed=1, **changes):
 
 def make_late(a_flight, delay):
     """Deliver the payload's poses `delay` [s] later, with their stamps."""
-    deliver, waiting = a_flight._delivered, deque()
+    deliver, waiting = a_flight.delivered, deque()
 
     def late(samples):
         *others, payload = deliver(samples)
@@ -39,7 +39,7 @@ def make_late(a_flight, delay):
             _, due = waiting.popleft()
         return *others, due
 
-    a_flight._delivered = late
+    a_flight.delivered = late
 
 
 def grasps(a_flight):

@@ -25,10 +25,10 @@ def numbers(memory: np.ndarray) -> dict[str, int | float]:
 
 
 class Number:
-    """A number of the object's `memory` as its attribute of the same name."""
+    """A number of the object's `memory` as its attribute of the same name, or with _ before it."""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
+        self._name = name.removeprefix("_")
 
     def __get__(self, one: Any, owner: type) -> int | float:
         return one.memory[self._name].item()

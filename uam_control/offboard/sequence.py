@@ -35,6 +35,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from uam_control.maths.memory import Number, record
 from uam_control.offboard.advice import passing, with_advice
 from uam_control.offboard.modes import (
     CUSTOM_MODE_ENABLED,
@@ -158,6 +159,8 @@ class OffboardSequence:
     sequence has given up, else ""; `stopped`: the motors must stay still until the next flight.
     """
 
+    _streamed, _time = Number(), Number()
+
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
         self.parameters = (parameters or OffboardParameters()).validated()
         self.phase = Phase.WAITING
@@ -170,7 +173,9 @@ class OffboardSequence:
         self._attempts = 0
         self._in_flight = False  # from FLYING until disarmed on request, or a new desired state
         self._offboard_since: float | None = None  # [s] the autopilot is in OFFBOARD since then
-        self._streamed = -math.inf  # [s] newest setpoint
+        # [s]: newest setpoint, last update
+        self.memory = record("", "streamed time")
+        self._streamed = -math.inf
         self._stream_lost = -math.inf  # [s] newest time at which no setpoint reached the autopilot
         self._arm_asked = -math.inf  # [s] newest request to arm
         self._regain_requests = 0  # left of an operator's command
@@ -184,8 +189,13 @@ class OffboardSequence:
         self._late = 0.0  # [s] for which the tick that began last has waited
         self._stop: Request | None = None  # repeated until the vehicle is disarmed
         self._halted = math.inf  # [s] since when
-        self._time = 0.0  # [s] of the last update
         self._passing: dict[str, float] = {}  # reason that may pass → [s] since when
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is to be decided until the autopilot reports a change, or is silent."""
+        flies = self.phase is Phase.FLYING and self._desired and not self.stopped
+        return flies and self._offboard_since is not None
 
     @property
     def streaming(self) -> bool:

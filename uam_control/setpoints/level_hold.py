@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import CHI, X, Y, Z
+from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.memory import Known, Number, record
 from uam_control.setpoints.kinds.desired import Desired
 from uam_control.settings.parameter_set import ParameterSet, number
 
@@ -69,17 +71,19 @@ class LevelHold:
     against it. A swinging arm pushes the vehicle: tilt and thrust act against the velocity.
     """
 
+    _time, _since, _thrust, _yaw = Number(), Known(), Known(), Number()
+
     def __init__(self, parameters: HoldParameters, gravity: float) -> None:
         """gravity [m/s^2]."""
         self.parameters = parameters
         self._gravity = gravity
         self.rates = np.zeros(3)
         self._desired = np.zeros((3, 3))  # see `Desired.attitude`
-        self._yaw = 0.0  # [rad] of the last valid command
+        # [s]: last tick, begin of the hold; thrust: mean; yaw [rad]: of the last valid command
+        self.memory = record("", "time since thrust yaw")
+        self.memory[0] = -math.inf, math.nan, math.nan, 0.0
         self._integral = np.zeros(2)  # rad/s
-        self._thrust: float | None = None
-        self._time = -math.inf
-        self._since: float | None = None
+        self._follow = prepared(follow_thrust, self.memory, 0.0, 0.0, 0.0, True)
 
     @property
     def active(self) -> bool:
@@ -96,16 +100,8 @@ class LevelHold:
 
         followed: the autopilot is in OFFBOARD.
         """
-        self._since = None
-        self._yaw, thrust = desired.attitude.item(CHI, Z), desired.thrust
-        if not followed:
-            return
-        dt = time - self._time
-        self._time = time
-        if self._thrust is None or not 0.0 < dt < _THRUST_TIME:
-            self._thrust = thrust
-        else:
-            self._thrust += dt / _THRUST_TIME * (thrust - self._thrust)
+        yaw = desired.attitude.item(CHI, Z)
+        self._follow(self.memory, time, desired.thrust, yaw, followed)
 
     def reset(self) -> None:
         """Clear the mean thrust; call it while the vehicle is on the ground."""
@@ -167,3 +163,18 @@ class LevelHold:
             return 0.0
         limit = self.parameters.hold_acceleration_limit
         return min(limit, max(-limit, -self.parameters.hold_braking * speed))
+
+
+@borrowing
+def follow_thrust(hold: np.ndarray, time: float, thrust: float, yaw: float, followed: bool) -> None:
+    """Do what `LevelHold.good` does; hold (1,): its memory."""
+    m = hold[0]
+    m.since, m.yaw = math.nan, yaw
+    if not followed:
+        return
+    dt = time - m.time
+    m.time = time
+    if math.isnan(m.thrust) or not 0.0 < dt < _THRUST_TIME:
+        m.thrust = thrust
+    else:
+        m.thrust += dt / _THRUST_TIME * (thrust - m.thrust)

@@ -42,6 +42,7 @@ import numpy as np
 from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.setpoints.rotor_geometry import torque_scale
 from uam_control.setpoints.thrust_curve import (
     command_of_thrust,
@@ -197,13 +198,24 @@ def rate_thrust_of_state(
     return rate_thrust_map(tau_p, tau_q, attitude, body_rates, p, rates)
 
 
+@jit
+def use_factor(memory: np.ndarray, flat: np.ndarray, factor: float) -> None:
+    """Use a thrust factor; memory (1,), flat (14,): of the `RateThrustMap`."""
+    m = memory[0]
+    m.factor = factor
+    flat[_BATTERY] = m.battery * factor
+
+
 class RateThrustMap:
     """`rate_thrust_map` with its parameters; one instance per flight.
 
-    `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `thrust_factor`: true
+    `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `flat`: see
+    `RateThrustParameters.flat`; never replaced. `thrust_factor`: true
     thrust / thrust of the parameters' curve, 1 at first. `curve`: the numbers of that curve, as
     `thrust_of_command` takes them.
     """
+
+    _factor = Number()
 
     def __init__(
         self,
@@ -212,22 +224,26 @@ class RateThrustMap:
     ) -> None:
         """parameters: None for those of the vehicle; vehicle: None for the default one."""
         self.rates = np.zeros(3)
+        self.flat = np.zeros(_LENGTH)
+        # battery: full thrust now / full thrust with a full battery, by the parameters
+        self.memory = record("", "factor battery")
         self._factor = 1.0
         self._vehicle = vehicle or load_description()
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
         three = self.rates
         self._thrust = prepared(thrust_of_command, 0.0, *self.curve)
-        self._map = prepared(rate_thrust_map, three, three, three, three, self._flat, three)
+        self._map = prepared(rate_thrust_map, three, three, three, three, self.flat, three)
         self._map_state = prepared(
-            rate_thrust_of_state, three, three, np.zeros((3, ALPHA)), self._flat, three
+            rate_thrust_of_state, three, three, np.zeros((3, ALPHA)), self.flat, three
         )
 
     def configure(self, parameters: RateThrustParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         checked = parameters.validated()
-        self._flat = p = checked.flat(self._vehicle)
+        self.flat[:] = p = checked.flat(self._vehicle)
         self.curve = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())
         self.parameters = checked
+        self.memory["battery"] = checked.battery_factor
         self.thrust_factor = self._factor
 
     @property
@@ -245,8 +261,7 @@ class RateThrustMap:
         """Set the factor; raises ValueError, without a change, if it is not a positive number."""
         if not (math.isfinite(factor) and factor > 0.0):
             raise ValueError(f"thrust factor {factor} is not a positive number")
-        self._factor = factor
-        self._flat[_BATTERY] = self.parameters.battery_factor * factor
+        use_factor(self.memory, self.flat, factor)
 
     def map(
         self, tau_p: np.ndarray, tau_q: np.ndarray, attitude: np.ndarray, body_rates: np.ndarray
@@ -256,19 +271,19 @@ class RateThrustMap:
         tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in
         ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
         """
-        thrust = self._map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
+        thrust = self._map(tau_p, tau_q, attitude, body_rates, self.flat, self.rates)
         return self.rates, _accepted(thrust)
 
     def map_state(
         self, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray
     ) -> tuple[np.ndarray, float]:
         """Return `map` of the attitude and body rates in state (3, 6 + n), see `coordinates`."""
-        thrust = self._map_state(tau_p, tau_q, state, self._flat, self.rates)
+        thrust = self._map_state(tau_p, tau_q, state, self.flat, self.rates)
         return self.rates, _accepted(thrust)
 
     def scaled(self, command: float, factor: float) -> float:
         """Return the normalised thrust that makes `factor` times the thrust of `command`."""
-        p = self._flat
+        p = self.flat
         curves = p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]
         return command_of_thrust(factor * thrust_of_command(command, *curves), *curves)
 

@@ -90,13 +90,13 @@ class SetpointSource:
         """setpoint: the type that is sent; fresh [s]: age up to which an attitude or a velocity is
         used; say(text, kind): called for each warning."""
         self.map = rate_map
-        self._type = setpoint
-        self._hold = LevelHold(hold, rate_map.gravity)
+        self.type = setpoint
+        self.hold = LevelHold(hold, rate_map.gravity)
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
         self._estimated = -math.inf  # stamp [s] of the estimate
-        self._seen = -math.inf, UNKNOWN  # stamp [s]; quaternion
+        self.seen = np.array([-math.inf, *(math.nan,) * 4])  # stamp [s] and quaternion of a pose
         self._motion = np.full((3, ALPHA), math.nan)  # estimate
         self._height = 0.0
         self._ground: float | None = None  # height [m] at which the vehicle stood
@@ -105,7 +105,7 @@ class SetpointSource:
     @property
     def holding(self) -> bool:
         """Whether the setpoint of the last tick came from the level hold."""
-        return self._hold.active
+        return self.hold.active
 
     def note_state(self, stamp: float, state: np.ndarray) -> None:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
@@ -117,7 +117,7 @@ class SetpointSource:
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
-        self._seen = stamp, quaternion
+        self.seen[0], self.seen[1:] = stamp, quaternion
 
     def commanded(
         self,
@@ -146,14 +146,14 @@ class SetpointSource:
                 self._say(f"setpoint refused: {error}", None)
             else:
                 desired = Desired(rates, attitude, thrust, reference)
-                setpoint = self._type(desired)
+                setpoint = self.type(desired)
                 refused = setpoint.refused()
                 if not refused:
-                    self._hold.good(now, desired, situation.followed)
+                    self.hold.good(now, desired, situation.followed)
                     return setpoint
                 self._say(f"setpoint refused: {refused}", None)
         elif not flying and tau_q is None and self._low(now, situation):
-            self._hold.reset()
+            self.hold.reset()
             return self._idle
         return self.without(now, situation)
 
@@ -172,20 +172,20 @@ class SetpointSource:
             return self._at_present(now)
         if not armed or (landed and not high):
             return self._idle
-        velocity, longest, p = UNKNOWN, None, self._hold.parameters
+        velocity, longest, p = UNKNOWN, None, self.hold.parameters
         if let_go:
             velocity, longest = CLIMBING, p.level_time
         elif not self._fresh(self._estimated, now):
             longest = p.release_time
         else:
             velocity = self._motion[CHI_DOT, POSITION]
-        desired = self._hold.setpoint(now, self._attitude(now), velocity, longest)
+        desired = self.hold.setpoint(now, self._attitude(now), velocity, longest)
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
         if desired is None:
             return None
         # in a failsafe the setpoints may be late: the autopilot levels the vehicle by itself
-        return (attitude_setpoint if let_go else self._type)(desired)
+        return (attitude_setpoint if let_go else self.type)(desired)
 
     def _present(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] while somebody else has control.
@@ -196,7 +196,7 @@ class SetpointSource:
             return None
         if not situation.armed or (situation.landed and not self._high(situation)):
             return self._idle
-        if not self._hold.mean_thrust:
+        if not self.hold.mean_thrust:
             self._say(f"thrust to hover unknown: {NO_STREAM}", "hold")
             return None
         self._present_at = now
@@ -217,13 +217,13 @@ class SetpointSource:
             gravity = self.map.gravity
             force = self._motion[CHI_DDOT, POSITION] + np.array([0.0, 0.0, gravity])
             lift = float(force @ matrix_from_euler(angles[0])[:, Z]) / gravity
-        thrust = self.map.scaled(self._hold.mean_thrust, min(MOST_LIFT, max(LEAST_LIFT, lift)))
-        return self._type(Desired(rates, angles, thrust))
+        thrust = self.map.scaled(self.hold.mean_thrust, min(MOST_LIFT, max(LEAST_LIFT, lift)))
+        return self.type(Desired(rates, angles, thrust))
 
     @property
     def _idle(self) -> Target:
         yaw = self._motion.item(CHI, YAW)
-        return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
+        return self.type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
 
     def _handed_over(self, now: float) -> bool:
         """Whether control came back just before, and the mission may not have resumed yet."""
@@ -249,7 +249,8 @@ class SetpointSource:
         """Return roll, pitch, yaw (3,) [rad]: the estimate, else mocap's if fresh, else NaN."""
         if self._fresh(self._estimated, now):
             return self._motion[CHI, ATTITUDE]
-        return euler_from_quaternion(self._seen[1]) if self._fresh(self._seen[0], now) else UNKNOWN
+        fresh = self._fresh(self.seen.item(0), now)
+        return euler_from_quaternion(self.seen[1:]) if fresh else UNKNOWN
 
     def _fresh(self, stamp: float, now: float) -> bool:
         return now - stamp < self._fresh_for

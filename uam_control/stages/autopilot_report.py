@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from uam_control.maths.memory import Number, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.loop_delay import LoopDelay
@@ -47,18 +48,21 @@ class AutopilotReport(NamedTuple):
 class AutopilotReports:
     """Makes the reports when they are due. `last`: the newest one."""
 
+    _due = Number()
+
     def __init__(
         self, autopilot: AutopilotPort, sequence: OffboardSequence, loop_delay: LoopDelay
     ) -> None:
         self._autopilot, self._sequence = autopilot, sequence
         self._loop_delay = loop_delay
-        self._due = -1  # [ns]
+        self.memory = record("due")  # [ns]
+        self._due = -1
         self._reported: tuple | None = None  # what a change of brings a report
         self.last: AutopilotReport | None = None
 
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
-        what = self.what(stamp)
+        what = self._what(stamp)
         if stamp < self._due and what == self._reported:
             return None
         autopilot = self._autopilot
@@ -72,7 +76,18 @@ class AutopilotReports:
         )
         return self.last
 
-    def what(self, stamp: int) -> tuple:
+    @property
+    def next(self) -> int:
+        """The stamp [ns] from which on the next report is due, even if nothing changes."""
+        return self._due
+
+    def settled(self, stamp: int) -> bool:
+        """Return whether the autopilot is connected at the tick `stamp` [ns], and all is reported
+        but the time."""
+        what = self._what(stamp)
+        return what[0] and what == self._reported
+
+    def _what(self, stamp: int) -> tuple:
         """Return what a change of brings a report at the tick `stamp` [ns]; `connected` first."""
         autopilot, sequence = self._autopilot, self._sequence
         return (

@@ -16,9 +16,13 @@ from typing import Any, Self
 import numpy as np
 
 from uam_control.control.sample_hold import SampleHold
+from uam_control.frames import swap_body
+from uam_control.maths.memory import Flag, Number, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence
+from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.kinds.catalogue import SetpointParameters
+from uam_control.setpoints.kinds.rates import rates_setpoint
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import (
@@ -73,10 +77,12 @@ class BridgeStage:
     `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
     they are returned, and the autopilot gets none of them.
     `sent`: body rates (3,) [rad/s, FLU] and thrust of the last setpoint, see `sent`;
-    `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by
-    that factor, at LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the
-    report of the autopilot due after the last tick, None if none is due.
+    `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by that factor, at
+    LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the report of the
+    autopilot due after the last tick, None if none is due; `last` [ns]: stamp of the last tick.
     """
+
+    factor, lift_due, last = Number(), Flag(), Number()
 
     def __init__(
         self,
@@ -93,29 +99,28 @@ class BridgeStage:
         self._dry_run = dry_run
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
-        self._measurements = FlightMeasurements(sets.identification, vehicle)
-        self.identification = self._measurements.identification
-        self.loop_delay = self._measurements.loop_delay
+        self.measurements = FlightMeasurements(sets.identification, vehicle)
+        self.identification = self.measurements.identification
+        self.loop_delay = self.measurements.loop_delay
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
-        self._vision = VisionPacing(sets.vision)
+        self.vision = VisionPacing(sets.vision)
         self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
-        self._reports = AutopilotReports(autopilot, sequence, self.loop_delay)
+        self.reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
         self.hands = False
+        self.memory = record("last lift_due", "factor")  # last [ns]: stamp of the last tick
         self.factor = 1.0
         self.sent = sent(None)
-        self.lift_due = False
-        self._last = 0  # stamp [ns] of the last tick
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Handle a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
 
         In flight the poses of a frozen tracker are discarded.
         """
-        if self._vision.take(stamp / SECOND, position, quaternion, self.autopilot.armed):
+        if self.vision.take(stamp / SECOND, position, quaternion, self.autopilot.armed):
             self.source.note_pose(stamp / SECOND, quaternion)
 
     def arm(self, arm: bool) -> None:
@@ -188,9 +193,9 @@ class BridgeStage:
         self._send(now, setpoint)
         airborne = flying and situation.armed
         self.factor = factor = self.map.thrust_factor
-        found = self._measurements.update(
+        found = self.measurements.update(
             now,
-            min(max(stamp - self._last, 0) / SECOND, LONGEST_STEP),
+            min(max(stamp - self.last, 0) / SECOND, LONGEST_STEP),
             state,
             rates,
             thrust,
@@ -201,15 +206,46 @@ class BridgeStage:
         )
         if found != factor:
             self.map.thrust_factor = found
-        self.lift_due = stamp // LIFT_PERIOD != self._last // LIFT_PERIOD
-        self._last = stamp
-        self.report = self._reports.due(stamp)
+        self.lift_due = stamp // LIFT_PERIOD != self.last // LIFT_PERIOD
+        self.last = stamp
+        self.report = self.reports.due(stamp)
         return setpoint
+
+    @property
+    def compiled(self) -> bool:
+        """Whether its setpoints are of the kind that compiled ticks send: body rates, each tick."""
+        rates = self.source.type is rates_setpoint
+        return rates and self._hold.rate <= 0.0 and not self._dry_run
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is to be decided until autopilot, mission or commands change."""
+        waits = self._orders or self.hands or self.identification.magnet_waits
+        return (
+            self._situation == Situation(True, False, False)
+            and not waits
+            and self.sequence.settled
+            and self.reports.settled(self.last)
+        )
+
+    def resume(self, stamp: int, state: np.ndarray, rates: np.ndarray, thrust: float) -> None:
+        """Go on after compiled ticks, the last one at `stamp` [ns] with state (3, 6 + n).
+
+        rates (3,) [rad/s, FLU], thrust: of its setpoint.
+        """
+        self.note_state(stamp, state)
+        self._kept = AttitudeTarget.of_rates(swap_body(rates), thrust)
+        self.sent = sent(self._kept)
+
+    @property
+    def kept(self) -> Setpoint:
+        """The setpoint of the last tick."""
+        return self._kept
 
     @property
     def lift(self) -> float:
         """See the class."""
-        return self._measurements.lift
+        return self.measurements.lift
 
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
         """Return the setpoint of the last period at `now` [s] if this one is not due."""
@@ -227,7 +263,7 @@ class BridgeStage:
         setpoint = self.source.without(now, self._situation)
         self.sent = sent(setpoint)
         self._send(now, setpoint)
-        self.report = self._reports.due(stamp)
+        self.report = self.reports.due(stamp)
         self.factor = self.map.thrust_factor
         return setpoint
 
@@ -238,7 +274,7 @@ class BridgeStage:
             setpoint = self.source.without(now, self._situation)
         autopilot.tick(now)
         estimate = self.source.estimate(now) if self._situation.armed else None
-        self._vision.send(autopilot, now, estimate)
+        self.vision.send(autopilot, now, estimate)
         if setpoint is not None and self.sequence.streaming and not self._dry_run:
             autopilot.send_setpoint(setpoint, now)
             self.sequence.streamed(now)

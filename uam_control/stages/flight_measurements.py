@@ -86,10 +86,10 @@ class FlightMeasurements:
         self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
         self._lift = np.zeros(1)
         memory = self.identification.record, self.identification.memory
-        self._arrays = MeasurementArrays(self.loop_delay.sums, *memory, self._lift)
+        self.arrays = MeasurementArrays(self.loop_delay.sums, *memory, self._lift)
         self._measure = prepared(
             *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), np.zeros(3), 0.0, True, True, 1.0),
-            *((0.0, 0.0, 0.0, 0.0), self._arrays, self.loop_delay.numbers),
+            *((0.0, 0.0, 0.0, 0.0), self.arrays, self.loop_delay.numbers),
         )
 
     @property
@@ -114,5 +114,5 @@ class FlightMeasurements:
             self.identification.follow_magnet(now, math.isfinite(now + thrust))
         return self._measure(
             *(now, step, state, rates, thrust, looped, flown, factor, curve),
-            *(self._arrays, self.loop_delay.numbers),
+            *(self.arrays, self.loop_delay.numbers),
         )

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.ages import FORWARDED
-from uam_control.coordinates import CHI, CHI_DOT
-from uam_control.estimation.pose_clock import PoseClock
-from uam_control.estimation.repeats import Repeats
-from uam_control.maths.compiled import jit
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT
+from uam_control.estimation.pose_clock import PoseClock, counts
+from uam_control.estimation.repeats import Repeats, repeated
+from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.memory import put, record
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.autopilot_port import AutopilotPort
@@ -34,6 +36,17 @@ class VisionParameters(ParameterSet):
     )
 
 
+class VisionArrays(NamedTuple):
+    """State of a `VisionPacing`. pose (7,): newest position and quaternion; last (7,), clock (1,):
+    of `Repeats` and `PoseClock`; numbers (1,): whether the pose waits; [s] of its exposure and that
+    of the last pose sent, interval."""
+
+    pose: np.ndarray
+    last: np.ndarray
+    clock: np.ndarray
+    numbers: np.ndarray
+
+
 class VisionPacing:
     """Stores the newest pose and sends it when the interval has passed.
 
@@ -41,41 +54,66 @@ class VisionPacing:
     """
 
     def __init__(self, parameters: VisionParameters) -> None:
-        self._parameters = parameters
-        self._pose: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._sent = -1.0  # [s] exposure of the last pose sent
-        self._clock, self._repeats = PoseClock(), Repeats()
+        p, numbers = parameters, record("waits", "exposed sent interval")
+        numbers[0] = False, 0.0, -1.0, p.vision_interval
+        self.arrays = VisionArrays(np.zeros(7), Repeats().newest, PoseClock().memory, numbers)
+        self._deviations = p.vision_position_deviation, p.vision_attitude_deviation
+        self._unknown = np.full((3, ALPHA), math.nan)
+        still = np.zeros(3)
+        self._take = prepared(take_pose, self.arrays, 0.0, still, np.zeros(4), True)
+        self._due = prepared(pose_due, self.arrays, 0.0, self._unknown, True)
 
     def take(
         self, exposed: float, position: np.ndarray, quaternion: np.ndarray, armed: bool
     ) -> bool:
-        """Store a pose of `exposed` [s]; return whether it is used.
-
-        position (3,) [m, ENU]; quaternion (4,) [w x y z], FLU → ENU. In flight (`armed`) a pose
-        equal to the one before is discarded: the tracker is frozen.
-        """
-        if self._repeats(position, quaternion) and armed:
-            return False
-        self._pose = exposed, position, quaternion
-        return True
+        """See `take_pose`."""
+        return self._take(self.arrays, exposed, position, quaternion, armed)
 
     def send(self, autopilot: AutopilotPort, now: float, state: np.ndarray | None) -> None:
-        """Send the newest pose if it is due at `now` [s], not too old, and of a right clock.
+        """Send the newest pose if it is due at `now` [s], see `pose_due`.
 
-        state (3, 6 + n): estimate of an armed vehicle, None if there is none. A pose that it
-        contradicts is discarded: the autopilot would follow it.
+        state (3, 6 + n): estimate of an armed vehicle, None if there is none.
         """
-        if self._pose is None or not self._clock(self._pose[0], now, FORWARDED):
-            return
-        p = self._parameters
-        exposed, position, quaternion = self._pose
-        if exposed - self._sent >= p.vision_interval - 1e-9:
-            self._pose = None
-            if state is not None and beyond(position, state, now - exposed) > BEYOND:
-                return
-            self._sent = exposed
-            deviations = p.vision_position_deviation, p.vision_attitude_deviation
-            autopilot.send_vision(VisionPose(exposed, position, quaternion, *deviations))
+        known = state is not None
+        if self._due(self.arrays, now, state if known else self._unknown, known):
+            pose, exposed = self.arrays.pose.copy(), self.arrays.numbers["exposed"].item()
+            autopilot.send_vision(VisionPose(exposed, pose[:3], pose[3:], *self._deviations))
+
+
+@borrowing
+def take_pose(
+    a: VisionArrays, exposed: float, position: np.ndarray, quaternion: np.ndarray, armed: bool
+) -> bool:
+    """Store a pose of `exposed` [s]; return whether it is used.
+
+    position (3,) [m, ENU]; quaternion (4,) [w x y z], FLU → ENU. In flight (`armed`) a pose
+    equal to the one before is discarded: the tracker is frozen.
+    """
+    if repeated(position, quaternion, a.last) and armed:
+        return False
+    m = a.numbers[0]
+    put(a.last, a.pose)
+    m.waits, m.exposed = True, exposed
+    return True
+
+
+@borrowing
+def pose_due(a: VisionArrays, now: float, state: np.ndarray, known: bool) -> bool:
+    """Return whether to send the pose at `now` [s]: due, not too old, and of a right clock.
+
+    state (3, 6 + n): used if `known`. A pose that it contradicts is discarded: the autopilot would
+    follow it.
+    """
+    m = a.numbers[0]
+    if not m.waits or not counts(a.clock, m.exposed, now, FORWARDED):
+        return False
+    if not m.exposed - m.sent >= m.interval - 1e-9:
+        return False
+    m.waits = False
+    if known and beyond(a.pose[:3], state, now - m.exposed) > BEYOND:
+        return False
+    m.sent = m.exposed
+    return True
 
 
 @jit

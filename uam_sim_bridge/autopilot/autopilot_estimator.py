@@ -16,6 +16,7 @@ import numpy as np
 from uam_control.ages import UNAIDED
 from uam_control.estimation.history import value_at
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -54,7 +55,8 @@ class EstimatorArrays(NamedTuple):
     estimate (10,). bias (3,): of the acceleration, NED [m/s^2], estimated from vision; without it a
     descent without vision would climb or fall. mean_force (3,) [m/s^2, FRD]: low-pass filtered
     specific force for the check before arming. past (HISTORY, 7): attitude and position of the last
-    samples; stamps (HISTORY,) [s]. vision_down (3,): vertical axis of the newest pose, FRD.
+    samples; stamps (HISTORY,) [s]. vision_down (3,): vertical axis of the newest pose, FRD. numbers
+    (1,): row of the newest sample; number and time [s] of the vision poses.
     """
 
     estimate: np.ndarray
@@ -63,23 +65,20 @@ class EstimatorArrays(NamedTuple):
     past: np.ndarray
     stamps: np.ndarray
     vision_down: np.ndarray
+    numbers: np.ndarray
 
 
 @jit
 def predict(
-    gyro: np.ndarray,
-    accel: np.ndarray,
-    time: float,
-    dt: float,
-    aided: bool,
-    newest: int,
-    arrays: EstimatorArrays,
-) -> None:
-    """Advance the estimate by dt [s] with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
+    gyro: np.ndarray, accel: np.ndarray, time: float, dt: float, arrays: EstimatorArrays
+) -> bool:
+    """Advance the estimate by dt [s] to `time` [s]; return whether it is aided.
 
-    newest: row of the history for this sample, of `time` [s].
+    gyro (3,) [rad/s] and specific force accel (3,) [m/s^2], FRD.
     """
-    estimate, bias, mean_force, past, stamps, _ = arrays
+    estimate, bias, mean_force, past, stamps, _, numbers = arrays
+    aided = time - numbers[0].vision_time < UNAIDED
+    newest = numbers[0].newest = (numbers[0].newest + 1) % HISTORY
     for i in range(3):
         mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
     matrix = matrix_from_quaternion(estimate[:_PLACE])
@@ -105,6 +104,7 @@ def predict(
     for i in range(_SPEED):
         past[newest, i] = estimate[i]
     stamps[newest] = time
+    return aided
 
 
 @jit
@@ -152,17 +152,17 @@ def correct(
 
 @jit
 def fuse(
-    position: np.ndarray,
-    quaternion: np.ndarray,
-    exposed: float,
-    age: float,
-    gap: float,
-    arrays: EstimatorArrays,
+    position: np.ndarray, quaternion: np.ndarray, time: float, age: float, arrays: EstimatorArrays
 ) -> None:
-    """Correct the estimate by a pose of `exposed` [s], `gap` [s] after the last one.
+    """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.
 
-    position (3,), quaternion (4,), age: see `Estimator.vision`.
+    position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: the pose is compared
+    with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon. The estimates
+    since then are corrected, too: the next late pose shows what is left, not the same again.
     """
+    m, exposed = arrays.numbers[0], time - age
+    gap, m.vision_time = time - m.vision_time, time
+    m.vision_count = 1 if gap > UNAIDED else m.vision_count + 1
     estimate, past, stamps = arrays.estimate, arrays.past, arrays.stamps
     before = estimate[_PLACE:].copy()
     if age != 0.0:
@@ -210,26 +210,27 @@ class Estimator:
     `estimate` (10,): attitude quaternion, position [m], velocity [m/s].
     """
 
+    _vision_time, _vision_count = Number(), Number()
+
     def __init__(self) -> None:
         self.estimate = np.zeros(_END)
         self.estimate[0] = 1.0
+        self.memory = record("newest vision_count", "vision_time")
         self._vision_time = -math.inf
-        self._vision_count = 0
         self._vision_down = np.array([0.0, 0.0, 1.0])
         self._force = np.zeros(3)
         self._past = np.zeros((HISTORY, _SPEED))  # attitude and position of the last samples
         self._past[:, 0] = 1.0  # level before the first sample
         self._stamps = np.full(HISTORY, -math.inf)  # [s]
-        self._newest = 0
         self._bias = np.zeros(3)
-        self._arrays = EstimatorArrays(
+        self.arrays = EstimatorArrays(
             *(self.estimate, self._bias, self._force),
-            *(self._past, self._stamps, self._vision_down),
+            *(self._past, self._stamps, self._vision_down, self.memory),
         )
         still = np.zeros(3)
-        self._fuse = prepared(fuse, still, still, 0.0, 0.0, 0.0, self._arrays)
-        self._predict = prepared(predict, still, still, 0.0, 0.0, True, 0, self._arrays)
-        self._rest = prepared(rest, 0.0, self._arrays)
+        self._fuse = prepared(fuse, still, still, 0.0, 0.0, self.arrays)
+        self._predict = prepared(predict, still, still, 0.0, 0.0, self.arrays)
+        self._rest = prepared(rest, 0.0, self.arrays)
 
     def aided(self, time: float) -> bool:
         """Whether the last vision pose is younger than UNAIDED at `time` [s]."""
@@ -241,31 +242,17 @@ class Estimator:
 
     def stands(self, dt: float) -> None:
         """Correct by the knowledge that the vehicle stands; dt [s]."""
-        self._rest(dt, self._arrays)
+        self._rest(dt, self.arrays)
 
     def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> bool:
-        """Advance by one sample and return `aided`.
-
-        gyro (3,) [rad/s], accel (3,) [m/s^2], FRD; dt [s].
-        """
-        aided = self.aided(time)
-        self._newest = (self._newest + 1) % HISTORY
-        self._predict(gyro, accel, time, dt, aided, self._newest, self._arrays)
-        return aided
+        """See `predict`."""
+        return self._predict(gyro, accel, time, dt, self.arrays)
 
     def vision(
         self, time: float, position: np.ndarray, quaternion: np.ndarray, age: float = 0.0
     ) -> None:
-        """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.
-
-        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: the pose is compared
-        with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon. The estimates
-        since then are corrected, too: the next late pose shows what is left, not the same again.
-        """
-        gap = time - self._vision_time
-        self._vision_time = time
-        self._vision_count = 1 if gap > UNAIDED else self._vision_count + 1
-        self._fuse(position, quaternion, time - age, age, gap, self._arrays)
+        """See `fuse`."""
+        self._fuse(position, quaternion, time, age, self.arrays)
 
     def faults(self, time: float) -> list[str]:
         """Return the reasons against arming in PX4's wording; empty if the estimate is valid."""

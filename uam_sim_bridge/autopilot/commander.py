@@ -25,6 +25,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_sim_bridge.autopilot.battery import ChargeState
 from uam_sim_bridge.autopilot.params import Parameters
@@ -38,6 +42,15 @@ BATTERY_WARNINGS = {
 }
 
 
+@jit
+def take_setpoint(commander: np.ndarray, time: float) -> None:
+    """Register a valid setpoint that arrived at `time` [s]; commander (1,): its memory."""
+    m = commander[0]
+    if time - m.stream_last > STREAM_GAP:
+        m.stream_start = time
+    m.stream_last = time
+
+
 class Commander:
     """The state machine.
 
@@ -45,16 +58,20 @@ class Commander:
     `texts`: (severity, text) of each STATUSTEXT not yet taken.
     """
 
+    _stream_start, _stream_last, _updated = Number(), Number(), Number()
+
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self.armed = False
         self.mode = self.intended = Mode.HOLD
         self.failsafe = False
-        self._killed_at = self._updated = -math.inf  # [s] since when the switch is engaged; now
+        # [s]: first and last setpoint of the stream, last update
+        self.memory = record("", "stream_start stream_last updated")
+        self.memory[0] = (-math.inf,) * 3
+        self._take_setpoint = prepared(take_setpoint, self.memory, 0.0)
+        self._killed_at = -math.inf  # [s] since when the switch is engaged
         self._killed = False
         self.texts: list[tuple[Severity, str]] = []
-        self._stream_start = -math.inf
-        self._stream_last = -math.inf
         self._sticks_last = -math.inf
         self._sticks_at_rest: tuple[float, ...] | None = None
         self._battery = ChargeState.UNDEFINED  # the worst since arming
@@ -62,6 +79,12 @@ class Commander:
         self._armed_at = 0.0
         self._flew = False
         self._landed_at: float | None = None
+
+    @property
+    def flies_offboard(self) -> bool:
+        """Whether it flies the companion's setpoints and has left the ground."""
+        flies = self.armed and self.mode is Mode.OFFBOARD and not self._killed
+        return flies and self._flew and self._landed_at is None
 
     @property
     def stopped(self) -> bool:
@@ -84,10 +107,8 @@ class Commander:
         return MavResult.ACCEPTED
 
     def setpoint(self, time: float) -> None:
-        """Register a valid setpoint that arrived at `time` [s]."""
-        if time - self._stream_last > STREAM_GAP:
-            self._stream_start = time
-        self._stream_last = time
+        """See `take_setpoint`."""
+        self._take_setpoint(self.memory, time)
 
     def streaming(self, time: float) -> bool:
         """Whether the stream of setpoints allows OFFBOARD."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Known, record
 from uam_control.offboard.modes import (
     CUSTOM_MODE_ENABLED,
     FORCE,
@@ -30,7 +31,14 @@ from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
-from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
+from uam_sim_bridge.autopilot.autopilot_estimator import (
+    POSITION,
+    VELOCITY,
+    Estimator,
+    EstimatorArrays,
+    fuse,
+    predict,
+)
 from uam_sim_bridge.autopilot.battery import SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.landing import LandDetector
@@ -125,12 +133,55 @@ def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
     return norm if 0.5 < norm < 2.0 else 0.0
 
 
+class CycleArrays(NamedTuple):
+    """What `fly_rates` uses. setpoint (4,): body rates [rad/s, FRD], thrust; commander (1,): its
+    memory; numbers (1,): time [s] of the last cycle, NaN before the first; [s] without setpoints
+    and thrust beyond which a cycle is another one."""
+
+    loop: RateLoop
+    estimator: EstimatorArrays
+    setpoint: np.ndarray
+    commander: np.ndarray
+    numbers: np.ndarray
+
+
+@jit
+def fly_rates(a: CycleArrays, time: float, gyro: np.ndarray, accel: np.ndarray) -> bool:
+    """Do what `Autopilot.update` does in flight with body rates; False, and nothing, if more is to
+    be decided."""
+    m, commander = a.numbers[0], a.commander[0]
+    if time - commander.stream_last > m.loss_time or not a.setpoint[3] > m.low_thrust:
+        return False
+    dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - m.time))
+    m.time = commander.updated = time
+    predict(gyro, accel, time, dt, a.estimator)
+    control_tick(gyro, dt, True, False, a.setpoint, a.loop)
+    return True
+
+
+@jit
+def take_vision(
+    time: float, position: np.ndarray, quaternion: np.ndarray, age: float, arrays: EstimatorArrays
+) -> bool:
+    """Handle an external pose; False: refused as not usable.
+
+    position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: `age_by` its arrival.
+    """
+    norm = magnitude_of_usable(position, quaternion)
+    if norm == 0.0 or age == math.inf:
+        return False
+    fuse(position, quaternion / norm, time, age, arrays)
+    return True
+
+
 class Autopilot:
     """PX4-class autopilot.
 
     `motors` (rotors,): commands 0..1 in PX4's order, zero while disarmed; each `update` overwrites
     them.
     """
+
+    _time = Known()
 
     def __init__(self, parameters: Parameters | None = None, sample_rate: float = 250.0) -> None:
         """parameters: None for those of the default vehicle; sample_rate [Hz]: of `update`."""
@@ -150,7 +201,9 @@ class Autopilot:
         self._memory = np.zeros((7, 3))
         self.rates = self._memory[FILTERED]  # filtered body rates (3,) [rad/s, FRD]
         self._velocity = self.estimator.estimate[VELOCITY]
-        self._time: float | None = None
+        self.memory = record("", "time loss_time low_thrust")
+        self._time = None
+        self._flew_rates = False  # in the last cycle; no own mode of the autopilot did
         self.actuators = np.full(ACTUATORS, np.nan)  # set by DO_SET_ACTUATOR; NaN: disarmed value
         self.gripper: dict[int, bool] = {}  # number → whether DO_GRIPPER has closed it
         self.imu = np.zeros(3), np.zeros(3)  # newest sample: gyro, specific force, as in `update`
@@ -207,15 +260,8 @@ class Autopilot:
     def vision(
         self, time: float, position: np.ndarray, quaternion: np.ndarray, age: float = 0.0
     ) -> bool:
-        """Handle an external pose; False: refused as not usable.
-
-        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: `age_by` its arrival.
-        """
-        norm = magnitude_of_usable(position, quaternion)
-        if not norm or age == math.inf:
-            return False
-        self.estimator.vision(time, position, quaternion / norm, age)
-        return True
+        """See `take_vision`."""
+        return self._take_vision(time, position, quaternion, age, self.estimator.arrays)
 
     def manual(self, time: float, sticks: tuple[float, float, float, float]) -> None:
         """Handle the pilot's sticks: forward, right, up, yaw clockwise, each -1..1 (finite)."""
@@ -274,6 +320,9 @@ class Autopilot:
 
         gyro (3,) [rad/s] and specific force accel (3,) [m/s^2], FRD, float64 (at rest z = -g).
         """
+        if self.settled and self._fly_rates(self.arrays, time, gyro, accel):
+            self.imu = gyro, accel
+            return self.motors
         if self._time is None:
             self._time = time - 1.0 / self._sample_rate
             reset_filters(gyro, self._filters, self._memory)
@@ -287,7 +336,7 @@ class Autopilot:
         self.battery.update(time, commander.armed)
         commander.update(time, landing.landed, self.battery.state)
         setpoint = self._setpoint
-        descending = False
+        descending = self._flew_rates = False
         if self._position is None or not commander.armed or commander.mode is not Mode.OFFBOARD:
             self._position_control.reset()
         if commander.armed and commander.mode is not Mode.OFFBOARD:
@@ -297,6 +346,7 @@ class Autopilot:
         else:
             self._descent.reset()
             self._position_modes.reset()
+            self._flew_rates = True
             if commander.armed and self._position is not None:
                 estimate = self.estimator.estimate
                 setpoint = self._position_control.update(self._position, estimate, dt)
@@ -326,6 +376,13 @@ class Autopilot:
         self, gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray
     ) -> None:
         self._control_tick(gyro, dt, armed, landed, setpoint, self._loop)
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is to be decided but by thrust and stream, see `fly_rates`."""
+        rates = self._flew_rates and self._position is None and self._desired is None
+        battery = self.battery.charge is not None or self.parameters["SIM_BAT_ENABLE"]
+        return rates and not battery and self.commander.flies_offboard and self.landing.flies
 
     @property
     def status(self) -> AutopilotStatus:
@@ -381,6 +438,16 @@ class Autopilot:
         )
         self._attitude_gains = attitude_gains(p)
         self.landing.configure(p)
+        self.memory["loss_time"], self.memory["low_thrust"] = p["COM_OF_LOSS_T"], self.landing.low
+        self.arrays = CycleArrays(
+            *(self._loop, self.estimator.arrays, self._setpoint),
+            *(self.commander.memory, self.memory),
+        )
+        still = np.zeros(3)
+        self._fly_rates = prepared(fly_rates, self.arrays, 0.0, still, still)
+        self._take_vision = prepared(
+            take_vision, 0.0, still, np.zeros(4), 0.0, self.estimator.arrays
+        )
         self._descent.configure(p)
         self._position_modes.configure(p)
         self._position_control.configure(p)

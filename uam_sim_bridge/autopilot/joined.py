@@ -17,6 +17,7 @@ import numpy as np
 from uam_control.ages import DISCONNECTED, age_by
 from uam_control.frames import swap_quaternion, swap_sample, swap_world
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Flag, Number, record
 from uam_control.offboard.modes import MavResult, Severity
 from uam_control.offboard.sequence import (
     COMMANDS,
@@ -52,6 +53,13 @@ def at_once() -> float:
     return 0.0
 
 
+# heartbeat, landed: sent, not yet received. [s]: tick of the last `poll`, shortest time between two
+# of them, newest message, newest setpoint that reached the autopilot, next regular reports, delays
+# of the last poll
+WHOLE = "heartbeat landed"
+REAL = "now period received_at delivered heartbeat_due landed_due late_to late_from"
+
+
 class JoinedAutopilot(FlightState):
     """An `AutopilotPort` to the `Autopilot` in the same process.
 
@@ -59,31 +67,59 @@ class JoinedAutopilot(FlightState):
     autopilot's next cycle, in which messages arrive; set by the owner at each tick.
     """
 
+    _heartbeat, _landed = Flag(), Flag()
+    _now, _period, _received_at, _delivered = (Number() for _ in range(4))
+    _heartbeat_due, _landed_due = Number(), Number()
+
     def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
         """sequence: of the bridge; it receives answers and texts."""
         super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
         self.landed = self.failsafe = self.killed = False
-        self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
+        self.memory = record(WHOLE, REAL)
+        self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0)
         self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
         self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
         self.late_from: Callable[[], float] = at_once  # [s] of a message of the autopilot
         self._outgoing: deque[tuple[float, Callable[[], None]]] = deque()  # due [s], delivers it
         self._incoming: deque[tuple[float, _Received]] = deque()
-        self.round_trip: float | None = None
-        self._now = -math.inf  # [s] tick of the last `poll`
-        self._period = math.inf  # [s] between two of them, the shortest
         self.time = 0.0
-        self._received_at = -math.inf
         self._sample: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
-        self._swap = prepared(swap_sample, *self._own_sample, *self._own_sample)
+        self.own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
+        self._swap = prepared(swap_sample, *self.own_sample, *self.own_sample)
+        self._report = prepared(report, self.memory, 0.0)
+        self._begin_poll = prepared(begin_poll, self.memory, 0.0)
         self._told: AutopilotStatus | None = None
-        self._heartbeat_due = self._landed_due = -math.inf  # [s]
-        self._heartbeat = self._landed = False  # sent, not yet received
         self._answers: list[tuple[Request, MavResult]] = []
+
+    @property
+    def round_trip(self) -> float | None:
+        """The time [s] of a message of the last tick to the autopilot, and of its answer."""
+        m = self.memory[0]
+        known = m.period < math.inf
+        return float(m.period + m.late_to + m.late_from) if known else None
+
+    @property
+    def at_once(self) -> bool:
+        """Whether the link loses and delays no message."""
+        link = self.passes, self.receives, self.late_to, self.late_from
+        return link == (always, always, at_once, at_once)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the autopilot flies rates in OFFBOARD, and its next reports bring no change."""
+        status, told = self.autopilot.status, self._told
+        seen = self.armed, self.mode, self.landed, self.failsafe, self.intended, self.killed
+        waits = self._outgoing or self._incoming or self._answers or self.autopilot.commander.texts
+        return (
+            self.autopilot.settled
+            and not (waits or self.failsafe)
+            and self._doubted is None
+            and seen == status == told
+            and self._period < math.inf
+        )
 
     @property
     def loss_time(self) -> float:
@@ -104,9 +140,9 @@ class JoinedAutopilot(FlightState):
         `round_trip` is that of a message of this tick: its delays, and one tick for the answer. A
         gap between two ticks is no round trip.
         """
-        self._period, self._now = min(self._period, time - self._now), time
-        late_to, late_from, period = self.late_to(), self.late_from(), self._period
-        self.round_trip = period + late_to + late_from if period < math.inf else None
+        self._begin_poll(self.memory, time)
+        late_to, late_from = self.late_to(), self.late_from()
+        self.memory["late_to"], self.memory["late_from"] = late_to, late_from
         while self._outgoing and self._outgoing[0][0] <= time + 1e-9:
             self._outgoing.popleft()[1]()
         texts = self.autopilot.commander.texts
@@ -196,7 +232,7 @@ class JoinedAutopilot(FlightState):
 
         gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
-        own_gyro, own_force = self._own_sample
+        own_gyro, own_force = self.own_sample
         self._swap(gyro, force, own_gyro, own_force)
         motors = self.autopilot.update(time, own_gyro, own_force)
         self._sample = time, gyro, force
@@ -204,13 +240,27 @@ class JoinedAutopilot(FlightState):
         if status != self._told:
             self._told = status
             self._heartbeat_due = self._landed_due = -math.inf
-        if time >= self._heartbeat_due - 1e-9:
-            self._heartbeat = True
-            self._heartbeat_due = following(self._heartbeat_due, HEARTBEAT, time)
-        if time >= self._landed_due - 1e-9:
-            self._landed = True
-            self._landed_due = following(self._landed_due, LANDED, time)
+        self._report(self.memory, time)
         return motors
+
+
+@jit
+def begin_poll(port: np.ndarray, time: float) -> None:
+    """Begin a tick of the bridge at `time` [s]; port (1,): memory of a `JoinedAutopilot`."""
+    m = port[0]
+    m.period, m.now = min(m.period, time - m.now), time
+
+
+@jit
+def report(port: np.ndarray, time: float) -> None:
+    """Send the regular reports that are due at `time` [s]."""
+    m = port[0]
+    if time >= m.heartbeat_due - 1e-9:
+        m.heartbeat = True
+        m.heartbeat_due = following(m.heartbeat_due, HEARTBEAT, time)
+    if time >= m.landed_due - 1e-9:
+        m.landed = True
+        m.landed_due = following(m.landed_due, LANDED, time)
 
 
 @jit

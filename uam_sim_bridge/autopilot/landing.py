@@ -20,7 +20,7 @@ _WIDER = 2.5  # factor on the motion thresholds while maybe landed (PX4)
 
 class LandDetector:
     """`landed` is true on the ground and while disarmed; `maybe_landed` freezes the integrals;
-    `contact`: the ground is touched."""
+    `contact`: the ground is touched; `low`: thrust up to which there may be evidence of that."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.landed = True
@@ -29,10 +29,15 @@ class LandDetector:
         self._since = [-math.inf, -math.inf, -math.inf]  # [s] begin of the evidence of each stage
         self.configure(parameters)
 
+    @property
+    def flies(self) -> bool:
+        """Whether there is no evidence of any stage."""
+        return self._since == [math.inf] * 3
+
     def configure(self, parameters: Parameters) -> None:
         """Take the thresholds from the autopilot's parameters."""
         least, hover = parameters["MPC_THR_MIN"], parameters["MPC_THR_HOVER"]
-        self._low = least + _LOW_THRUST * (hover - least)
+        self.low = least + _LOW_THRUST * (hover - least)
         self._none_descending = least + _NO_THRUST * (hover - least)
         self._none = parameters["MPC_MANTHR_MIN"] + 0.01
         self._rotation = math.radians(parameters["LNDMC_ROT_MAX"])
@@ -57,12 +62,12 @@ class LandDetector:
         if not armed:
             self.contact = self.maybe_landed = self.landed = True
             return
-        if thrust > self._low:  # as in all of a flight: no evidence of any stage
+        if thrust > self.low:  # as in all of a flight: no evidence of any stage
             self._since[:] = math.inf, math.inf, math.inf
             self.contact = self.maybe_landed = self.landed = False
             return
         wider = _WIDER if self.maybe_landed else 1.0
-        contact = thrust <= self._low and (
+        contact = thrust <= self.low and (
             velocity is None
             or abs(velocity[2]) <= wider * self._vertical
             and math.hypot(velocity[0], velocity[1]) <= self._horizontal

@@ -13,10 +13,10 @@ from uam_control.maths.compiled import borrowing, inlined, jit
 from uam_control.maths.memory import put
 from uam_control.stages import estimator_stage
 from uam_control.stages.estimator_stage import STATE, take_readings, take_sample
+from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
 from uam_lab.flights.direct.record import MOTORS, RowLayout, record
-from uam_lab.flights.direct.steady.bridge import BridgeArrays, send, take_pose
-from uam_lab.flights.direct.steady.cycle import CycleArrays, cycle
+from uam_lab.flights.direct.steady.bridge import BridgeArrays, cycle, reports, send
 from uam_lab.flights.direct.steady.inputs import (
     BIAS,
     JOINTS,
@@ -57,7 +57,6 @@ class TickArrays(NamedTuple):
     laws: LawArrays
     bridge: BridgeArrays
     reference: ReferenceArrays
-    autopilot: CycleArrays
     state: np.ndarray
     flown: np.ndarray
     bias: np.ndarray
@@ -70,9 +69,8 @@ class TickArrays(NamedTuple):
 
 
 # entries of `counts`: row of the recording, ticks of its ring (first, next), stamp [ns] of state
-# and of the mission's begin (0: none), whether a setpoint was sent, cycles of the autopilot,
-# address of an error's text
-ROW, FIRST, NEXT, STAMP, BEGUN, SENT, CYCLES, FAULT = range(8)
+# and of the mission's begin (0: none), address of an error's text
+ROW, FIRST, NEXT, STAMP, BEGUN, FAULT = range(6)
 
 
 @cache
@@ -106,7 +104,7 @@ def run(steps: Steps, arrays: Callable[[int], TickArrays]) -> Callable[[int, int
             if end != END:
                 return done, end
             done += 1
-            if a.bridge.memory[0].reported:
+            if reports(a.bridge):
                 return done, END
 
     return steady_run
@@ -136,8 +134,10 @@ def begin_tick(a: TickArrays) -> int:
     position, quaternion, pose_stamp = pose[1:4], pose[4:8], -1
     if slot >= 0:
         pose_stamp = stamp_of(pose[0])
-        if not take_pose(a.bridge, pose_stamp / SECOND, position, quaternion):
-            return LISTEN
+        exposed = pose_stamp / SECOND
+        if take_pose(a.bridge.vision, exposed, position, quaternion, True):
+            a.bridge.seen[0] = exposed
+            put(quaternion, a.bridge.seen[1:])
         i.kept[MOCAP], i.at[MOCAP] = True, pose_stamp
         put(pose[1:], i.mocap)
     i.kept[JOINTS], i.at[JOINTS] = True, joint_stamp
@@ -176,7 +176,6 @@ def decide(a: TickArrays) -> int:
         *(a.bridge, stamp, time, a.state, tau_p, tau_q, laws.position.attitude, a.inputs),
     ):
         return BRIDGE
-    c[SENT] = 1
     if not advance(a.reference, a.inputs, stamp, a.state):
         return REFERENCE
     return WATCH if watch_due(a.reference) else RECORD
@@ -185,7 +184,7 @@ def decide(a: TickArrays) -> int:
 @inlined
 def end_tick(a: TickArrays) -> int:
     """Record the tick, run the autopilot and the physics; return END, or where they end."""
-    c, s, m, bridge = a.counts, a.plant, a.plant.numbers[0], a.bridge.memory[0]
+    c, s, m, bridge = a.counts, a.plant, a.plant.numbers[0], a.bridge
     position, attitude, arm = a.laws.position, a.laws.attitude, a.laws.arm
     time = m.tick * m.period
     magnet = 1.0 if a.magnet[0] else 0.0
@@ -193,14 +192,13 @@ def end_tick(a: TickArrays) -> int:
     c[FIRST] = record(
         *(a.table, c[ROW], a.ring, c[FIRST], c[NEXT], time, a.motors, magnet, stamp),
         *(a.reference.memory[0].begun, a.state, a.flown, position.attitude),
-        *(position.all.tau, attitude.all.tau, arm.all.tau, a.bridge.rates, bridge.sent),
-        *(bridge.used, a.layout),
+        *(position.all.tau, attitude.all.tau, arm.all.tau, bridge.rates, bridge.sent[1]),
+        *(bridge.bridge[0].factor, a.layout),
     )
     c[NEXT] += 1
     c[ROW] += 1
     sample = s.samples[m.tick % len(s.samples)]
-    if not cycle(a.autopilot, a.bridge, time, sample[0:3], sample[3:6]):
+    if not cycle(bridge, time, sample[0:3], sample[3:6]):
         return AUTOPILOT
-    c[CYCLES] += 1
     c[FAULT] = step(s, a.motors, arm.command, a.magnet[0])
     return ERROR if c[FAULT] else END

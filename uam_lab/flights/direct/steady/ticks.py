@@ -12,14 +12,13 @@ import numpy as np
 
 from uam_control.maths.compiled import active, counts_references, prepared
 from uam_control.maths.kept_tuple import KeptTuple
+from uam_control.stages.autopilot_report import AutopilotReport
 from uam_control.stages.bridge_stage import BridgeStage
 from uam_control.stages.control_tick import STAGES, ControlTick, take_report
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stamps import SECOND
 from uam_lab.flights.direct.record import TickRecorder
-from uam_lab.flights.direct.steady.bridge import BridgePart
-from uam_lab.flights.direct.steady.cycle import CyclePart
+from uam_lab.flights.direct.steady.bridge import bridge_arrays
 from uam_lab.flights.direct.steady.inputs import InputsPart
 from uam_lab.flights.direct.steady.laws import law_arrays
 from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
@@ -69,8 +68,7 @@ class SteadyTicks:
         self.able = usual and type(port.autopilot) is Autopilot and not flight.autopilot_imu
         if not self.able:
             return
-        self._bridge = BridgePart(stages.bridge)
-        self.able = plant.compiled and self._bridge.able()
+        self.able = plant.compiled and stages.bridge.compiled and port.at_once
         if not self.able:
             return
         self._controllers = [one.controller for one in stages.laws.values()]
@@ -80,10 +78,11 @@ class SteadyTicks:
             return
         self._inputs = InputsPart(stages.mission.inputs, self._controllers, plant.joints)
         self._reference = ReferencePart(stages.mission)
-        self._cycle = CyclePart(flight.autopilot)
-        self._counts, self._biases = np.zeros(8, dtype=np.int64), np.zeros((2, 3))
+        self._sent = np.zeros(2)
+        self._counts, self._biases = np.zeros(6, dtype=np.int64), np.zeros((2, 3))
         self._magnet = np.zeros(1, dtype=np.bool_)
         self._made: tuple = ()
+        self._reported = -1  # [ns] tick of the newest report
         self._loop: Callable[[int, int], tuple[int, int]] | None = None
 
     def fly(self, enough: int, most: int) -> int:
@@ -132,7 +131,8 @@ class SteadyTicks:
 
     def _renew(self, most: int) -> int:
         """Take a report and new noise between two ticks; return as `_load` does."""
-        report, stamp = self._bridge.report(), self._counts.item(STAMP)
+        stamp = self._counts.item(STAMP)
+        report = self._report()
         if report is not None:
             self._inputs.report(stamp, (report.round_trip, report.loop_delay))
             self._flight.control.measured_delay.report(stamp, report.loop_delay)
@@ -140,18 +140,28 @@ class SteadyTicks:
         most = min(most, self._flight.plant.draw_noise(), self._ticks_to_report(stamp))
         return self._reference.renew(self._flight.control.signals.state, most)
 
+    def _report(self) -> AutopilotReport | None:
+        """Make the report that the last compiled tick of the bridge has, if it is not made."""
+        bridge = self._flight.control.bridge
+        if not self._sent[0] or bridge.last == self._reported:
+            return None
+        self._reported = bridge.last
+        return bridge.reports.due(bridge.last)
+
     def _ticks_to_report(self, stamp: int) -> int:
         """Return how many ticks after `stamp` [ns] the next report is due."""
-        return max(1, -((stamp - self._bridge.due) // self._reference.period))
+        left = self._flight.control.bridge.reports.next - stamp
+        return max(1, -(-left // self._reference.period))
 
     def _load(self, most: int, begin: int) -> int:
         """Copy the state into the arrays; return how many ticks may begin, -1: not steady.
 
         most: ticks that may end.
         """
-        stages, recorder = self._flight.control, self._flight.recorder
+        flight = self._flight
+        stages, recorder, self._sent[0] = flight.control, flight.recorder, 0.0
         signals, table, half = stages.signals, recorder.table, begin == RECORD
-        output, reference, bridge = stages.mission.output, self._reference, self._bridge
+        output, reference = stages.mission.output, self._reference
         told = output.arm, output.magnet, False, output.regains
         steady = (
             signals.flying
@@ -159,8 +169,8 @@ class SteadyTicks:
             and signals.magnet == output.magnet
             and stages._told == told
             and reference.steady(signals.stamp)
-            and bridge.load()
-            and self._cycle.load()
+            and stages.bridge.settled
+            and flight.autopilot.settled
             and not stages.estimator.held_back
             and self._inputs.load()
         )
@@ -170,7 +180,7 @@ class SteadyTicks:
         most = min(most, len(table.values) - table.count, left) - half
         most = min(most, self._ticks_to_report(signals.stamp))
         ring = recorder._first, recorder._next
-        self._counts[:] = table.count, *ring, signals.stamp, *(0,) * 4
+        self._counts[:] = table.count, *ring, signals.stamp, 0, 0
         return reference.load(signals.stamp, most) if most >= 0 else -1
 
     def _present(self) -> Callable[[int, int], tuple[int, int]]:
@@ -179,7 +189,7 @@ class SteadyTicks:
         made = (
             flight.recorder.table.values,
             *(one.arrays for one in self._controllers),
-            *(stages.bridge.map._flat, flight.autopilot.autopilot._loop),
+            *(stages.bridge.map.curve, flight.autopilot.autopilot.arrays),
             *(stages.mission.mission._guidance, stages.mission.mission._parameters),
         )
         same = len(made) == len(self._made) and all(map(is_, made, self._made))
@@ -191,9 +201,8 @@ class SteadyTicks:
                 stages.estimator.arrays,
                 self._inputs.arrays,
                 law_arrays(stages),
-                self._bridge.arrays(),
+                bridge_arrays(stages.bridge, flight.autopilot, self._sent),
                 self._reference.arrays(),
-                self._cycle.arrays(),
                 stages.signals.state,
                 stages.signals.reference,
                 self._biases,
@@ -216,25 +225,26 @@ class SteadyTicks:
         """Copy the state back after a loop that ended in `end`."""
         flight, stages = self._flight, self._flight.control
         signals, plant, recorder = stages.signals, flight.plant, flight.recorder
-        row, first, following, stamp, begun, sent, cycles, _ = self._counts.tolist()
+        row, first, following, stamp, begun, _ = self._counts.tolist()
         observed = end != END
         self._inputs.store()
         self._reference.store(signals.state)
-        self._bridge.store(signals.state, stamp / SECOND, bool(sent))
+        bridge = stages.bridge
+        bridge.report = self._report()
+        if self._sent[0]:
+            bridge.resume(stamp, signals.state, bridge.map.rates, self._sent.item(1))
         newest = plant.tick if observed else plant.tick - 1
-        if cycles:
-            self._cycle.store()
         table = recorder.table
         table.phases[table.count : row] = table.phase_names[signals.phase]
         table.count = row
         recorder._first, recorder._next, recorder._lag = first, following, following - first
         flight.autopilot.time = newest * plant.period
         signals.stamp = stamp
-        if stages.bridge.report is not None:
-            take_report(stages, stages.bridge.report)
+        if bridge.report is not None:
+            take_report(stages, bridge.report)
         if begun:
             signals.time = self._reference.begun(begun)
-        signals.thrust_factor, signals.setpoint = stages.bridge.factor, stages.bridge._kept
+        signals.thrust_factor, signals.setpoint = bridge.factor, bridge.kept
         if observed:
             found = flight.delivered(plant.arrived())
             signals.mocap, signals.joints, signals.imu, signals.payload = found
