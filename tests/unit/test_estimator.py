@@ -158,12 +158,12 @@ def test_new_parameters_are_those_of_the_next_sample():
 def test_age_of_poses_at_their_arrival():
     age = PoseAge()
     age.tick(4_000_000)
-    assert age.mean is None and age.largest == 0
+    assert age.average is None and age.largest == 0
     for tick in range(2, 400):
         if tick % 2 == 0:
             age.pose((tick - 2) * 4_000_000 - (1_000_000 if tick == 100 else 0))
         age.tick(tick * 4_000_000)
-    assert age.mean == pytest.approx(8e6, abs=5e3)
+    assert age.average == pytest.approx(8e6, abs=5e3)
     assert age.largest == 9_000_000
     age.restart()
     age.tick(2_000_000_000)  # without a new pose

@@ -11,7 +11,13 @@ from uam_control.maths.compiled import borrowing
 
 
 def record(whole: str, real: str = "", rows: int = 1) -> np.ndarray:
-    """Return a structured array (rows,) of zeros; whole, real: names of its int64 and float64."""
+    """Return a structured array (rows,) of zeros; whole, real: names of its int64 and float64.
+
+    Raises ValueError for a name that plain Python would take for an attribute of NumPy's.
+    """
+    taken = [name for name in f"{whole} {real}".split() if hasattr(np.record, name)]
+    if taken:
+        raise ValueError(f"not a name of a number: {', '.join(taken)}")
     fields = [(name, np.int64) for name in whole.split()]
     fields += [(name, np.float64) for name in real.split()]
     return np.zeros(

@@ -152,7 +152,9 @@ class StateEstimatorNode(UamNode):
             "estimates begun anew": self._stage.diverged,
             "IMU samples repeated": ticks.repeated,
             "IMU samples missing": ticks.missing,
-            "pose age at arrival, mean [ms]": "" if age.mean is None else f"{1e-6 * age.mean:.1f}",
+            "pose age at arrival, mean [ms]": ""
+            if age.average is None
+            else f"{1e-6 * age.average:.1f}",
             "pose age at arrival, max [ms]": f"{1e-6 * age.largest:.1f}",
         }
         age.restart()

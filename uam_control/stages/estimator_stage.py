@@ -36,14 +36,15 @@ STATE, NONE, OLDER = range(3)  # what a tick gives; OLDER: its stamp does not fo
 class PoseAge:
     """Age of poses at their arrival: stamp of the tick in which one arrives − its exposure.
 
-    `mean` [ns]: low-pass over MEMORY poses, None before the first; `largest` [ns]: since `restart`.
+    `average` [ns]: low-pass over MEMORY poses, None before the first; `largest` [ns]: since
+    `restart`.
     """
 
-    mean, largest = Known(), Number()
+    average, largest = Known(), Number()
 
     def __init__(self) -> None:
         # arrived [ns]: stamp of a pose that has come since the last tick, -1: none
-        self.memory = record("arrived largest", "mean")
+        self.memory = record("arrived largest", "average")
         self.memory[0] = -1, 0, math.nan
 
     def pose(self, exposed: int) -> None:
@@ -67,7 +68,7 @@ def age_at(age: np.ndarray, stamp: int) -> None:
         return
     now = stamp - m.arrived
     m.arrived = -1
-    m.mean = now if math.isnan(m.mean) else m.mean + (now - m.mean) / MEMORY
+    m.average = now if math.isnan(m.average) else m.average + (now - m.average) / MEMORY
     m.largest = max(m.largest, now)
 
 

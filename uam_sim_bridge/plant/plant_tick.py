@@ -37,9 +37,9 @@ class PlantArrays(NamedTuple):
     numbers: np.ndarray
 
 
-# steps: of the physics in a period; model, data: addresses of MuJoCo's structures; gusty: whether
-# there are gusts; imu_late, joints_late [ticks]; magnet_gain [N]: full holding force
-WHOLE = "tick steps model data gusty imu_late joints_late"
+# steps: of the physics in a period; model_at, data_at: addresses of MuJoCo's structures; gusty:
+# whether there are gusts; imu_late, joints_late [ticks]; magnet_gain [N]: full holding force
+WHOLE = "tick steps model_at data_at gusty imu_late joints_late"
 REAL = "period magnet_gain"
 
 
@@ -80,7 +80,7 @@ def step(a: PlantArrays, motors: np.ndarray, arm_command: np.ndarray, magnet: bo
     gust = a.gusts.rows[next_row(a.gusts) if m.gusty else 0]
     error = step_period(
         *(a.physics, motors, arm_command, magnet, gust, m.tick),
-        *(int(m.model), int(m.data), m.steps),
+        *(int(m.model_at), int(m.data_at), m.steps),
     )
     if not error:
         m.tick += 1
