@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test long slow mutants numbers lint clean
+.PHONY: help setup fly test long slow mutants numbers docs lint clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
@@ -43,6 +43,10 @@ mutants: setup   ## do the unit tests notice small errors? ten minutes; make mut
 
 numbers: setup   ## fly the numbers of the documentation again, list what moved; half an hour
 	@$(BIN)/python benchmarks/numbers_of_docs.py $(ARGS)
+
+docs: setup      ## the documentation as a searchable site, build/site/index.html; fails where a link is broken
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	@$(BIN)/zensical build --clean --strict
 
 lint: setup      ## style, errors that need no run, and who may import whom
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/lint-imports --no-cache --no-logo

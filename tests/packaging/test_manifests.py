@@ -7,6 +7,7 @@ import xml.etree.ElementTree as xml
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -67,6 +68,12 @@ def test_the_manifest_of_the_workspace_package_has_them_all():
     every = {key for manifest in MANIFESTS.values() for key in depends(manifest)}
     assert set(depends(ROOT / "package.xml")) == every - set(OWN)
     assert "python3-pytest" in depends(ROOT / "package.xml", "test_depend")
+
+
+def test_citation_and_changes_have_the_version():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["version"] == PROJECT["version"] and cited["license"] == PROJECT["license"]
+    assert f"\n## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
 
 
 @pytest.mark.parametrize("manifest", [ROOT / "package.xml", *MANIFESTS.values()])
