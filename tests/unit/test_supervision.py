@@ -32,7 +32,6 @@ from uam_control.supervision.checks import (
     Checks,
     measure,
     read,
-    readings_of,
 )
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
@@ -79,7 +78,7 @@ def test_every_check_has_a_value():
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 15
     nothing = Readings()
-    read(readings_of(nothing), nothing.joint_effort, nothing.gains, two, three, values)
+    read(nothing.values, nothing.joint_effort, nothing.gains, two, three, values)
     assert np.flatnonzero(np.isnan(values)).tolist() == [
         LATE,
         LATE_LOOP,

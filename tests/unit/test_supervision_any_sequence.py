@@ -23,14 +23,16 @@ from uam_control.supervision.states import TARGETS
 
 NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0])
 READINGS = st.builds(
-    Readings, *[NUMBERS] * 6,
-    st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
-    st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
-    autopilot_age=NUMBERS,
-    mocap_still=NUMBERS,
-    contradiction=NUMBERS,
-    round_trip=NUMBERS,
-    loop_delay=NUMBERS,
+    Readings,
+    joint_effort=st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
+    gains=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
+    **dict.fromkeys(
+        (
+            "battery", "mocap_age", "joint_age", "controller_age", "missed_ticks", "temperature",
+            "autopilot_age", "mocap_still", "contradiction", "round_trip", "loop_delay",
+        ),
+        NUMBERS,
+    ),
     mocap_position=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
 )  # fmt: skip
 

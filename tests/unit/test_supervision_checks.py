@@ -17,7 +17,6 @@ from uam_control.supervision.checks import (
     Checks,
     measure,
     read,
-    readings_of,
 )
 from uam_control.supervision.monitor import Level
 
@@ -105,7 +104,7 @@ def test_readings_have_their_places():
         joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
     limits = np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25])
-    read(readings_of(readings), readings.joint_effort, readings.gains, *limits, values)
+    read(readings.values, readings.joint_effort, readings.gains, *limits, values)
     np.testing.assert_array_equal(values[:9], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
@@ -118,7 +117,7 @@ def test_what_is_unknown_is_below_every_limit():
     values[[LATE, LATE_LOOP, LATE_FOR_REFERENCE]] = -math.inf  # by `Checks.update`
     nothing = Readings()
     read(
-        *(readings_of(nothing), nothing.joint_effort, nothing.gains),
+        *(nothing.values, nothing.joint_effort, nothing.gains),
         *(np.ones(2), np.ones(3), values),
     )
     np.testing.assert_array_equal(values[9:], -math.inf)

@@ -38,6 +38,7 @@ from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import prepared
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Flag, record
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import POSITION_SERVO
@@ -153,8 +154,8 @@ class PositionController(Controller):
         filtered = float(cutoff), desired.filter, desired.lead, desired.value
         arrays = PositionArrays(of_all, completion, self._integral, *filtered)
         rows = self._errors
-        self._begin = prepared(begin_law, of_all, rows, rows, desired.value, True)
-        self._end = prepared(end_position, arrays, rows, 0.0)
+        self._begin = bound(begin_law, of_all, rows, rows, desired.value, True)
+        self._end = bound(end_position, arrays, rows, 0.0)
         return arrays
 
     @property
@@ -186,9 +187,9 @@ class PositionController(Controller):
             else:
                 self._integral[:] = 0.0
         self._fit(state)
-        self._begin(self.arrays.all, state, reference, self._attitude.value, True)
+        self._begin(state, reference, self._attitude.value, True)
         self._run_law(dt)
-        self._end(self.arrays, reference, dt)
+        self._end(reference, dt)
         return self._tau
 
 
@@ -221,8 +222,8 @@ class AttitudeController(Controller):
             *(np.array(p.torque_max, dtype=float), now),
         )
         rows = self._errors
-        self._begin = prepared(begin_attitude, arrays, rows, rows, np.zeros((3, 3)), 0.0)
-        self._end = prepared(end_attitude, arrays)
+        self._begin = bound(begin_attitude, arrays, rows, rows, np.zeros((3, 3)), 0.0)
+        self._end = bound(end_attitude, arrays)
         return arrays
 
     def measured(self, loop_delay: float) -> None:
@@ -248,9 +249,9 @@ class AttitudeController(Controller):
         if self._begins() and _in_flight(reference):
             self._slow[:] = math.nan
         self._fit(state)
-        self._begin(self.arrays, state, reference, attitude_reference, dt)
+        self._begin(state, reference, attitude_reference, dt)
         self._run_law(dt)
-        self._end(self.arrays)
+        self._end()
         return self._tau
 
 
@@ -285,8 +286,8 @@ class ArmController(Controller):
             self._hold.memory,
         )
         rows = self._errors
-        self._begin = prepared(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)
-        self._end = prepared(end_arm, arrays, rows, rows, 0.0)
+        self._begin = bound(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)
+        self._end = bound(end_arm, arrays, rows, rows, 0.0)
         return arrays
 
     def reset_adaptation(self) -> None:
@@ -304,9 +305,9 @@ class ArmController(Controller):
     ) -> np.ndarray:
         """Return the torques and set `command`; the arguments: see `AttitudeController.update`."""
         self._fit(state)
-        self._begin(self.arrays.all, state, reference, attitude_reference, flying)
+        self._begin(state, reference, attitude_reference, flying)
         self._run_law(dt)
-        self._end(self.arrays, state, reference, dt)
+        self._end(state, reference, dt)
         return self._tau
 
 

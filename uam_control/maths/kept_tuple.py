@@ -8,7 +8,7 @@ functions are given its address.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -62,6 +62,33 @@ class KeptTuple:
         self._memory = np.zeros(size, dtype=np.uint8)
         self.address, self.read = self._memory.ctypes.data, _reader(kind)
         _keep(self.address, values)
+
+
+def bound(function: Callable, values: tuple, *arguments: object) -> Callable:
+    """Return `function` with `values` as its first argument, which is handed over once.
+
+    function: under `compiled.jit` or `compiled.borrowing`; later arguments must have the types of
+    these examples, see `compiled.prepared`.
+    """
+    kept = KeptTuple(values)
+    call = _calling(function, kept.read, len(arguments))
+    call = partial(compiled.prepared(call, kept.address, *arguments), kept.address)
+    call.kept = kept  # as long as somebody may call it
+    return call
+
+
+@cache
+def _calling(function: Callable, read: Callable[[int], Any], count: int) -> Callable:
+    """Return the function that reads the first argument of `function` at an address; count: of its
+    further ones."""
+    calls = (
+        lambda address: function(read(address)),
+        lambda address, a: function(read(address), a),
+        lambda address, a, b: function(read(address), a, b),
+        lambda address, a, b, c: function(read(address), a, b, c),
+        lambda address, a, b, c, d: function(read(address), a, b, c, d),
+    )
+    return compiled.borrowing(calls[count])
 
 
 @cache

@@ -20,7 +20,8 @@ from uam_control.estimation.estimator import (
     take_joints,
     take_mocap,
 )
-from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Known, Number, record
 from uam_control.stages.tick_stamps import TickStamps, follows, next_stamp
 from uam_control.stamps import SECOND
@@ -111,9 +112,9 @@ class EstimatorStage:
         )
         self._state, *_ = arrays_of(a.estimator.memory)
         sample, angles = np.zeros(3), np.zeros(joints)
-        self._pose = prepared(take_pose, a, 0, sample, np.zeros(4))
-        self._readings = prepared(take_readings, a, 0, angles, angles)
-        self._sample = prepared(take_sample, a, 0, sample, sample)
+        self._pose = bound(take_pose, a, 0, sample, np.zeros(4))
+        self._readings = bound(take_readings, a, 0, angles, angles)
+        self._sample = bound(take_sample, a, 0, sample, sample)
 
     @property
     def stamp(self) -> int:
@@ -131,11 +132,11 @@ class EstimatorStage:
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """See `take_pose`."""
-        self._pose(self.arrays, stamp, position, quaternion)
+        self._pose(stamp, position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
         """See `take_readings`."""
-        self._readings(self.arrays, stamp, alpha, alpha_dot)
+        self._readings(stamp, alpha, alpha_dot)
 
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
         """Take an IMU sample: see `take_sample`.
@@ -143,7 +144,7 @@ class EstimatorStage:
         Returns the state (3, 6 + n) of the tick `stamp`, see `coordinates`; the next call reuses
         the array. Raises ValueError if the stamp is older than the last one.
         """
-        found = self._sample(self.arrays, stamp, gyro, force)
+        found = self._sample(stamp, gyro, force)
         if found == OLDER:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
         return self._state if found == STATE else None

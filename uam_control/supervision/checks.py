@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
-from uam_control.supervision.observation import Observation
+from uam_control.supervision.observation import NUMBERS, Observation
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
@@ -121,8 +120,8 @@ BLIND = frozenset(check.name for check in CHECKS if check.blind)
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
 _SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
 _CHECKED = len(CHECKS)
-_MOCAP_AGE = [CHECKS[i].reading for i in _ROWS].index("mocap_age")
-readings_of = attrgetter(*(CHECKS[i].reading for i in _ROWS))
+_READ = tuple(NUMBERS.index(CHECKS[i].reading) for i in _ROWS)  # places of their readings
+_MOCAP_AGE = NUMBERS.index("mocap_age")
 
 
 class ExceededLimit(NamedTuple):
@@ -156,7 +155,7 @@ class Checks:
         self.setpoint_delay = math.nan
         self._stands = math.inf
         self.configure(parameters)
-        rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), (0.0,) * len(_ROWS)
+        rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), np.zeros(len(NUMBERS))
         self._measure = prepared(
             *(measure_all, rows, rows, three, 0.0, readings, three, three, 0.0, 0.0),
             *(self._bounds, 0, self._values),
@@ -203,7 +202,7 @@ class Checks:
             seen.reference,
             readings.mocap_position,
             seen.ground,
-            readings_of(readings),
+            readings.values,
             readings.joint_effort,
             readings.gains,
             link,
@@ -250,7 +249,7 @@ def measure_all(
     reference: np.ndarray,
     mocap: np.ndarray,
     ground: float,
-    readings: tuple[float, ...],
+    readings: np.ndarray,
     efforts: np.ndarray,
     gains: np.ndarray,
     link: float,
@@ -319,7 +318,7 @@ def measure(
 
 @jit
 def read(
-    readings: tuple[float, ...],
+    readings: np.ndarray,
     efforts: np.ndarray,
     gains: np.ndarray,
     effort_limits: np.ndarray,
@@ -328,11 +327,11 @@ def read(
 ) -> None:
     """Write the readings into values[9:].
 
-    readings: those of CHECKS; efforts (n,): of the joints [N m], gains (3,): of position, attitude,
-    arm, with their limits.
+    readings: values of `Readings`; efforts (n,): of the joints [N m], gains (3,): of position,
+    attitude, arm, with their limits.
     """
     for i in range(len(_ROWS)):
-        values[_ROWS[i]] = _known(readings[i] * _SIGNS[i])
+        values[_ROWS[i]] = _known(readings[_READ[i]] * _SIGNS[i])
     values[EFFORT] = _largest(efforts, effort_limits)
     values[GAIN] = _largest(gains, gain_limits)
 

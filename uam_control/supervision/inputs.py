@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.ages import STALE
-from uam_control.estimation.repeats import Repeats
-from uam_control.maths.compiled import jit
+from uam_control.estimation.repeats import Repeats, repeated
+from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.memory import Known, Number, put, record
 from uam_control.supervision.observation import Readings
 from uam_control.supervision.pace import Pace
 
@@ -20,64 +22,87 @@ WATCHED = ("K", "zeta")  # prefixes of the names of gains with a limit
 SUBSYSTEMS = (*POSE, "arm")
 
 
+# stamps [s], NaN before the first: of the newest messages; moved: of the first pose like the
+# newest; bias_first: of the first bias; position, attitude, arm: of the gains; oldest,
+# oldest_of_pose: of those; last: of the tick
+REAL = (
+    "mocap joints autopilot payload moved bias_first bias_last "
+    "position attitude arm oldest oldest_of_pose last"
+)
+
+
+class InputArrays(NamedTuple):
+    """State of `Inputs`. readings (1,), position, payload (3,), effort (n,), gains (3,): of
+    `Readings`; bias_mean (3,) [m/s^2]; newest (7,): of `Repeats`; numbers (1,): see REAL."""
+
+    readings: np.ndarray
+    position: np.ndarray
+    payload: np.ndarray
+    effort: np.ndarray
+    gains: np.ndarray
+    bias_mean: np.ndarray
+    newest: np.ndarray
+    numbers: np.ndarray
+
+
 class Inputs:
     """Newest values and their stamps. Ages are differences of stamps and do not depend on the time
-    of delivery."""
+    of delivery. `arrays`: what compiled functions use."""
+
+    _autopilot, _last = Number(), Known()
 
     def __init__(self, period: float) -> None:
         """period [s]: of control ticks."""
         self._period = period
         self.begin_anew()
+        a, three, places = self.arrays, np.zeros(3), np.zeros(0, dtype=int)
+        self._take_pose = prepared(take_pose, a, 0.0, three, np.zeros(4))
+        self._take_bias = prepared(take_bias, a, 0.0, three)
+        self._take_gains = prepared(take_gains, a, 0, 0.0, three, places)
+        self._take_ages = prepared(take_ages, a, 0.0)
 
     def begin_anew(self) -> None:
         """Forget all values: stamps of a new simulation follow."""
-        self._readings = Readings()
-        self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
-        self._payload = math.nan  # stamp [s]
-        self._moved = math.nan  # stamp [s] of the first pose like the newest
-        self._repeats = Repeats()
-        self._bias: tuple[float, float] | None = None  # stamps [s] of the first and the newest
-        self._bias_mean = np.zeros(3)  # [m/s^2]
+        self._readings, self.memory = Readings(), record("", REAL)
+        self.memory.view(np.float64)[:] = math.nan
         self._temperatures: dict[str, float] = {}
-        self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
-        self._of_pose: dict[str, float] = {}
-        self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
-        self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], np.ndarray] = {}
         self._pace = Pace()
+        self._make_arrays(np.zeros(3), Repeats().newest)
+
+    def _make_arrays(self, bias_mean: np.ndarray, newest: np.ndarray) -> None:
+        r = self._readings
+        known = r.mocap_position, r.payload_position, r.joint_effort, r.gains
+        self.arrays = InputArrays(r.memory, *known, bias_mean, newest, self.memory)
+
+    @property
+    def settled(self) -> bool:
+        """Whether every controller has sent gains, and no tick was missed within a second."""
+        m = self.memory[0]
+        known = not math.isnan(m.position + m.attitude + m.arm + m.last)
+        return known and not self._gaps and self._readings.missed_ticks == 0.0
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Store a mocap pose exposed at `stamp` [s].
-
-        position (3,) [m, world]; quaternion (4,) body → world [w x y z].
-        """
-        self._mocap = stamp
-        self._readings.mocap_position[:] = position
-        if not self._repeats(position, quaternion):
-            self._moved = stamp
+        """See `take_pose`."""
+        self._take_pose(self.arrays, stamp, position, quaternion)
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
         """Store joint readings at `stamp` [s]; effort (n,): measured torques [N m]."""
-        self._joints = stamp
-        self._readings.joint_effort = np.array(effort, dtype=float)
+        self.memory["joints"] = stamp
+        if len(effort) != len(self._readings.joint_effort):
+            self._readings.joint_effort = np.zeros(len(effort))
+            self._make_arrays(self.arrays.bias_mean, self.arrays.newest)
+        self._readings.joint_effort[:] = effort
 
     def payload(self, stamp: float, position: np.ndarray) -> None:
         """Store the grip point (3,) [m, world] of the payload, exposed at `stamp` [s]."""
-        self._payload = stamp
+        self.memory["payload"] = stamp
         self._readings.payload_position[:] = position
 
     def accelerometer_bias(self, stamp: float, bias: np.ndarray) -> None:
-        """Store the estimated bias (3,) [m/s^2, FLU] of the accelerometer at `stamp` [s].
-
-        A real bias changes slowly. The estimate changes fast where motion capture and IMU
-        contradict each other: exchanged axes, a wrong body.
-        """
-        if self._bias is None:
-            self._bias, self._bias_mean[:] = (stamp, stamp), bias
-        first, last = self._bias
-        self._bias = first, stamp
-        self._readings.contradiction = follow_bias(stamp, first, last, bias, self._bias_mean)
+        """See `take_bias`."""
+        self._take_bias(self.arrays, stamp, bias)
 
     def lift(self, thrust: float) -> None:
         """Store the filtered collective thrust [N]."""
@@ -106,17 +131,15 @@ class Inputs:
 
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
         """Store the adapted gains of one of SUBSYSTEMS at `stamp` [s]: names (n), values (n,)."""
-        key = tuple(names)
-        if key not in self._watched:
-            watched = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
-            self._watched[key] = np.array(watched, dtype=int)
-        largest = largest_of(values, self._watched[key])
-        self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
-        self._controllers[subsystem] = stamp
-        self._oldest = min(self._controllers.values())
-        if subsystem in POSE:
-            self._of_pose[subsystem] = stamp
-            self._oldest_of_pose = min(self._of_pose.values())
+        number = SUBSYSTEMS.index(subsystem)
+        self._take_gains(self.arrays, number, stamp, values, self.watched(tuple(names)))
+
+    def watched(self, names: tuple[str, ...]) -> np.ndarray:
+        """Return the places (m,) of the gains with a limit among `names`."""
+        if names not in self._watched:
+            places = [i for i, name in enumerate(names) if name.startswith(WATCHED)]
+            self._watched[names] = np.array(places, dtype=int)
+        return self._watched[names]
 
     def wall_clock(self, stamp: float, wall: float) -> None:
         """Store the wall clock's time `wall` [s] of the tick `stamp` [s]."""
@@ -130,21 +153,73 @@ class Inputs:
             missed = round((stamp - self._last) / self._period) - 1
             if missed > 0:
                 gaps.append((stamp, missed))
-        self._last = stamp
         while gaps and stamp - gaps[0][0] > 1.0:
             gaps.popleft()
         readings.missed_ticks = float(sum(missed for _, missed in gaps)) if gaps else 0.0
-        if self._bias is not None and stamp - self._bias[1] > STALE:
-            readings.contradiction = math.nan
-        readings.stamp = stamp
-        readings.mocap_age = stamp - self._mocap
-        readings.mocap_still = stamp - self._moved
-        readings.joint_age = stamp - self._joints
-        readings.autopilot_age = stamp - self._autopilot
-        readings.payload_age = stamp - self._payload
-        readings.controller_age = stamp - self._oldest
-        readings.pose_controller_age = stamp - self._oldest_of_pose
+        self._take_ages(self.arrays, stamp)
         return readings
+
+
+@borrowing
+def take_pose(a: InputArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Store a mocap pose exposed at `stamp` [s].
+
+    position (3,) [m, world]; quaternion (4,) body → world [w x y z].
+    """
+    m = a.numbers[0]
+    m.mocap = stamp
+    put(position, a.position)
+    if not repeated(position, quaternion, a.newest):
+        m.moved = stamp
+
+
+@borrowing
+def take_bias(a: InputArrays, stamp: float, bias: np.ndarray) -> None:
+    """Store the estimated bias (3,) [m/s^2, FLU] of the accelerometer at `stamp` [s].
+
+    A real bias changes slowly. The estimate changes fast where motion capture and IMU
+    contradict each other: exchanged axes, a wrong body.
+    """
+    m = a.numbers[0]
+    if math.isnan(m.bias_first):
+        m.bias_first = m.bias_last = stamp
+        put(bias, a.bias_mean)
+    away = follow_bias(stamp, m.bias_first, m.bias_last, bias, a.bias_mean)
+    m.bias_last, a.readings[0].contradiction = stamp, away
+
+
+@borrowing
+def take_gains(
+    a: InputArrays, number: int, stamp: float, values: np.ndarray, watched: np.ndarray
+) -> None:
+    """Store the adapted gains (n,) of a controller, by its number in SUBSYSTEMS, at `stamp` [s];
+    watched: see `Inputs.watched`."""
+    m = a.numbers[0]
+    a.gains[number] = largest_of(values, watched)
+    if number == 0:
+        m.position = stamp
+    elif number == 1:
+        m.attitude = stamp
+    else:
+        m.arm = stamp
+    m.oldest_of_pose = np.fmin(m.position, m.attitude)
+    m.oldest = np.fmin(m.oldest_of_pose, m.arm)
+
+
+@borrowing
+def take_ages(a: InputArrays, stamp: float) -> None:
+    """Write the ages at the tick `stamp` [s]."""
+    m, r = a.numbers[0], a.readings[0]
+    m.last = r.stamp = stamp
+    if stamp - m.bias_last > STALE:
+        r.contradiction = math.nan
+    r.mocap_age = stamp - m.mocap
+    r.mocap_still = stamp - m.moved
+    r.joint_age = stamp - m.joints
+    r.autopilot_age = stamp - m.autopilot
+    r.payload_age = stamp - m.payload
+    r.controller_age = stamp - m.oldest
+    r.pose_controller_age = stamp - m.oldest_of_pose
 
 
 @jit

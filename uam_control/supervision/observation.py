@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.maths.memory import Number, record
 from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.states import Event
 
@@ -40,7 +41,14 @@ class Authority(NamedTuple):
     stopped: bool = False
 
 
-@dataclass
+NUMBERS = (
+    *("battery", "temperature", "missed_ticks", "slower", "contradiction", "lift"),
+    *("mocap_age", "mocap_still", "joint_age", "payload_age"),
+    *("controller_age", "pose_controller_age", "autopilot_age"),
+    *("round_trip", "loop_delay", "stamp"),
+)  # of the readings
+
+
 class Readings:
     """Readings besides state and reference; NaN means unknown and has no effect.
 
@@ -56,29 +64,23 @@ class Readings:
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
     payload_age [s]: of that pose. lift [N]: filtered collective thrust. contradiction [m/s^2]: of
     motion capture and IMU, the fast change of the accelerometer's estimated bias. slower: than the
-    wall clock, 1 − real-time factor of a simulation.
+    wall clock, 1 − real-time factor of a simulation. `values`: all NUMBERS.
     """
 
-    battery: float = math.nan
-    mocap_age: float = math.nan
-    joint_age: float = math.nan
-    controller_age: float = math.nan
-    missed_ticks: float = math.nan
-    temperature: float = math.nan
-    joint_effort: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
-    pose_controller_age: float = math.nan
-    autopilot_age: float = math.nan
-    mocap_still: float = math.nan
-    round_trip: float = math.nan
-    loop_delay: float = math.nan
-    mocap_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
-    payload_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
-    payload_age: float = math.nan
-    lift: float = math.nan
-    contradiction: float = math.nan
-    slower: float = math.nan
-    stamp: float = math.nan
+    battery, temperature, missed_ticks, slower, contradiction, lift = (Number() for _ in range(6))
+    mocap_age, mocap_still, joint_age, payload_age = (Number() for _ in range(4))
+    controller_age, pose_controller_age, autopilot_age = (Number() for _ in range(3))
+    round_trip, loop_delay, stamp = (Number() for _ in range(3))
+
+    def __init__(self, **known: float | np.ndarray) -> None:
+        """known: by name; the others are unknown."""
+        self.memory = record("", " ".join(NUMBERS))
+        self.values = self.memory.view(np.float64)
+        self.values[:] = math.nan
+        self.joint_effort, self.gains = np.zeros(0), np.full(3, math.nan)
+        self.mocap_position, self.payload_position = np.full((2, 3), math.nan)
+        for name, value in known.items():
+            setattr(self, name, value)
 
 
 @dataclass

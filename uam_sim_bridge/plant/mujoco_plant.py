@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from uam_control.maths.compiled import prepared
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Number, record
 from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos
@@ -37,8 +38,6 @@ from uam_sim_bridge.plant.sensors import (
     Mocap,
     Noise,
     generators,
-    receive_poses,
-    send_pose,
 )
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
@@ -221,11 +220,9 @@ class MujocoPlant(Plant):
             self.memory,
         )
         truth = self._unused_truth
-        self._sense, self._take_samples = (
-            prepared(sense, a, truth),
-            prepared(take_samples, a, truth),
-        )
-        self._step = prepared(step, a, motors, np.empty(self.joints), True)
+        self._sense, self._take_samples = bound(sense, a, truth), bound(take_samples, a, truth)
+        self._take_poses = bound(take_due_poses, a)
+        self._step = bound(step, a, motors, np.empty(self.joints), True)
         self._write_truth = prepared(write_truth, a.observed, 1.0, a.truth, truth)
 
     def _bench(self) -> Bench:
@@ -265,11 +262,11 @@ class MujocoPlant(Plant):
         """See `Plant.observe`."""
         self.draw_noise()
         if self._effects is None:
-            self._sense(self.arrays, row)
+            self._sense(row)
         else:
-            self._take_samples(self.arrays, row)
+            self._take_samples(row)
             self._affect(self._effects)
-            receive_poses(self.arrays.mocap, self.tick)
+            self._mocap.receive(self.tick)
         return self.arrived()
 
     @property
@@ -290,15 +287,15 @@ class MujocoPlant(Plant):
         row = a.samples[self.tick % len(a.samples)]
         sample = row.copy()
         row[0:3], row[3:6] = effects.imu(sample[0:3], sample[3:6])
-        if not take_due_poses(a):
+        if not self._take_poses():
             return
         pose, late = effects.pose(mocap.taken(VEHICLE_POSE))
         due = self.tick + mocap.ticks + late
         if pose is not None:
             a.mocap.taken[VEHICLE_POSE] = pose[0], *pose[1], *pose[2]
-            send_pose(a.mocap, VEHICLE_POSE, due)
+            mocap.send(VEHICLE_POSE, due)
         if mocap.tracks:
-            send_pose(a.mocap, PAYLOAD_POSE, due)
+            mocap.send(PAYLOAD_POSE, due)
 
     def arrived(self) -> Samples:
         """Return the samples that have arrived at this tick, as copies."""
@@ -328,7 +325,7 @@ class MujocoPlant(Plant):
         if self._effects is not None:
             self._step_with_effects(self._effects, motor_commands, arm_command, magnet)
             return
-        error = self._step(self.arrays, motor_commands, arm_command, magnet)
+        error = self._step(motor_commands, arm_command, magnet)
         if error:
             raise PhysicsError(f"MuJoCo: {error_text(error)}")
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
@@ -126,7 +127,8 @@ WHOLE, REAL = "tracks ticks", "period next payload_top"
 class Mocap:
     """OptiTrack: poses of vehicle and payload at its own rate. No pose overtakes another.
 
-    `arrays`: never replaced; `tracks`, `ticks`, `period`: see WHOLE, REAL.
+    `send`, `receive`: `send_pose`, `receive_poses`; `arrays`: never replaced; `tracks`, `ticks`,
+    `period`: see WHOLE, REAL.
     """
 
     tracks, ticks, period = Flag(), Number(), Number()
@@ -154,6 +156,8 @@ class Mocap:
             np.zeros(3),
             self.memory,
         )
+        self.send = bound(send_pose, self.arrays, 0, 0)
+        self.receive = bound(receive_poses, self.arrays, 0)
 
     def draw(self) -> int:
         """Draw noise; return for how many poses it is left."""

@@ -10,9 +10,9 @@ is silent, a value beyond a limit. If so, the loop ends there, and the objects t
 stage and the rest of the tick. So all decisions are made by the objects, and a recording is the
 same bit for bit (tests/flights/test_steady_ticks.py).
 
-The state of the mission and of the supervisor's inputs is still copied (`ReferencePart`,
-`InputsPart`): `load` before the loop, `store` after it. Whoever changes that state changes its
-part, too; the test notices what is missing.
+The state of the mission (`ReferencePart`) and the messages that wait for the supervisor
+(`KeptMessages`) are still copied: `load` before the loop, `store` after it. Whoever changes that
+state changes its part, too; the test notices what is missing.
 
 A flight with faults, effects, a plant or a setpoint of its own is flown by the objects alone.
 """

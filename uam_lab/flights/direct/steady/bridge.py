@@ -106,7 +106,7 @@ def send(
     m.lift_due = stamp // LIFT_PERIOD != m.last // LIFT_PERIOD
     if m.lift_due:
         inputs.kept[LIFT] = True
-        inputs.memory[0].lift_kept = a.measured.lift[0]
+        inputs.lift[0] = a.measured.lift[0]
     m.last = stamp
     return True
 

@@ -4,45 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.ages import BRIDGED, STALE, usable
+from uam_control.ages import BRIDGED
 from uam_control.control.controllers import Controller
-from uam_control.estimation.repeats import repeated
+from uam_control.estimation.pose_clock import counts
 from uam_control.maths.compiled import borrowing
-from uam_control.maths.memory import numbers, put, record
+from uam_control.maths.memory import put
 from uam_control.stages.supervisor_inputs import READ_PERIOD, SupervisorInputs
 from uam_control.stamps import SECOND
-from uam_control.supervision.checks import CHECKS, readings_of
+from uam_control.supervision import inputs
 from uam_control.supervision.inputs import (
     SUBSYSTEMS,
-    follow_bias,
-    largest_of,
+    take_ages,
+    take_bias,
+    take_gains,
+    take_pose,
 )
 
-_NAMES = [check.reading for check in CHECKS if check.reading]  # as `readings_of`
-_MOCAP_AGE, _STILL, _JOINT_AGE, _AUTOPILOT_AGE, _CONTROLLER_AGE, _CONTRADICTION, _MISSED = (
-    _NAMES.index(name)
-    for name in (
-        *("mocap_age", "mocap_still", "joint_age", "autopilot_age"),
-        *("controller_age", "contradiction", "missed_ticks"),
-    )
-)
-_delays = attrgetter("round_trip", "loop_delay", "lift")
 MOCAP, JOINTS, PAYLOAD, BIAS, LIFT, GAINS = range(6)  # kept messages; GAINS: of three controllers
 KINDS = ("mocap", "joints", "payload", "IMU bias", "lift", *SUBSYSTEMS)
 
 
 class InputArrays(NamedTuple):
-    """State of the inputs.
+    """The kept messages, and the arrays of the inputs.
 
     kept (8,): whether a message of each of KINDS waits, at (8,): its stamp, [ns] for the first
-    three, else [s]; mocap (7,), payload (3,), effort (n,), bias (3,), gains: its values. read_*:
-    the values that were read. bias_mean (3,); newest (7,): pose before; watched: of each
-    controller's gains. values: of `readings_of`; largest (3,): of the gains.
+    three, else [s]; mocap (7,), payload (3,), effort (n,), bias (3,), lift (1,), gains: its values;
+    watched: places of each controller's gains. clock, supervisor (1,): of `SupervisorInputs`.
     """
 
     kept: np.ndarray
@@ -51,31 +42,16 @@ class InputArrays(NamedTuple):
     payload: np.ndarray
     effort: np.ndarray
     bias: np.ndarray
+    lift: np.ndarray
     gains: tuple[np.ndarray, np.ndarray, np.ndarray]
-    read_position: np.ndarray
-    read_payload: np.ndarray
-    read_effort: np.ndarray
-    bias_mean: np.ndarray
-    newest: np.ndarray
     watched: tuple[np.ndarray, np.ndarray, np.ndarray]
-    values: np.ndarray
-    largest: np.ndarray
-    memory: np.ndarray
+    inputs: inputs.InputArrays
+    clock: np.ndarray
+    supervisor: np.ndarray
 
 
-WHOLE = "read_at bias_known"
-REAL = (
-    "lift_kept mocap joints autopilot payload moved last bias_first bias_last "
-    "position attitude arm oldest oldest_of_pose payload_age pose_controller_age "
-    "round_trip loop_delay lift"
-)
-_LAST, _LIFT, _PAYLOAD_AGE = (
-    (*WHOLE.split(), *REAL.split()).index(name) for name in ("last", "lift", "payload_age")
-)
-
-
-class InputsPart:
-    """The part of `SupervisorInputs`."""
+class KeptMessages:
+    """The messages that `SupervisorInputs` keeps, in arrays while compiled ticks fly."""
 
     def __init__(
         self, kept: SupervisorInputs, controllers: Sequence[Controller], joints: int
@@ -83,137 +59,65 @@ class InputsPart:
         """controllers: of position, attitude and arm."""
         self._kept, self._joints = kept, joints
         self._names = [tuple(one.names) for one in controllers]
-        self._gains = [np.zeros(len(names)) for names in self._names]
-        self.arrays: InputArrays | None = None
+        self._waits, self._at = np.zeros(len(KINDS), dtype=np.bool_), np.zeros(len(KINDS))
+        gains = tuple(np.zeros(len(names)) for names in self._names)
+        sizes = 7, 3, joints, 3, 1  # as `InputArrays`
+        self._values = (*(np.zeros(size) for size in sizes), gains)
+
+    def arrays(self) -> InputArrays:
+        """Return the arrays."""
+        kept = self._kept
+        watched = tuple(map(kept.inputs.watched, self._names))
+        own = self._waits, self._at, *self._values, watched
+        return InputArrays(*own, kept.inputs.arrays, kept.clock.memory, kept.memory)
 
     def load(self) -> bool:
-        """Copy the state into the arrays; return whether its ticks may be steady."""
-        inputs = self._kept.inputs
-        readings = inputs._readings
-        messages = {name: all_of_it[-1] for name, all_of_it in self._kept._kept.items()}
-        ready = (
-            not inputs._gaps
-            and inputs._last is not None
-            and len(inputs._controllers) == len(SUBSYSTEMS)
-            and all(names in inputs._watched for names in self._names)
-            and len(readings.joint_effort) == self._joints
-            and self._kept.readings is readings
-            and messages.keys() <= set(KINDS)
-            and readings.missed_ticks == 0.0
-        )
-        if not ready:
+        """Copy the messages into the arrays; return whether the next ticks may be compiled."""
+        kept, messages = self._kept, self._kept.newest()
+        known = kept.inputs.settled and len(kept.readings.joint_effort) == self._joints
+        if not known or messages.keys() - set(KINDS):
             return False
-        if self.arrays is None:
-            self._allocate()
-        a = self.arrays
-        a.kept[:] = False
-        lift = math.nan
-        for name, (_, message, _) in messages.items():
+        mocap, payload, effort, bias, lift, gains = self._values
+        self._waits[:] = False
+        for name, message in messages.items():
             kind = KINDS.index(name)
-            a.kept[kind] = True
+            self._waits[kind] = True
+            if kind != LIFT:
+                self._at[kind] = message[0]
             if kind == MOCAP:
-                a.at[kind] = message[0]
-                a.mocap[:3], a.mocap[3:] = message[1:]
+                mocap[:3], mocap[3:] = message[1:]
             elif kind == JOINTS:
-                a.at[kind], a.effort[:] = message[0], message[3]
+                effort[:] = message[3]
             elif kind == PAYLOAD:
-                a.at[kind], a.payload[:] = message[:2]
+                payload[:] = message[1]
             elif kind == BIAS:
-                a.at[kind], a.bias[:] = message
+                bias[:] = message[1]
             elif kind == LIFT:
-                lift = message[0]
+                lift[:] = message[0]
             else:
-                a.at[kind], a.gains[kind - GAINS][:] = message[0], message[3]
-        a.read_position[:] = readings.mocap_position
-        a.read_payload[:] = readings.payload_position
-        a.read_effort[:] = readings.joint_effort
-        a.bias_mean[:] = inputs._bias_mean
-        a.values[:] = readings_of(readings)
-        a.largest[:] = readings.gains
-        bias, controllers = inputs._bias, inputs._controllers
-        a.memory[0] = (
-            *(self._kept._read_at, bias is not None),
-            *(lift, inputs._mocap, inputs._joints, inputs._autopilot, inputs._payload),
-            *(inputs._moved, inputs._last, *(bias or (math.nan, math.nan))),
-            *(controllers[name] for name in SUBSYSTEMS),
-            *(inputs._oldest, inputs._oldest_of_pose),
-            *(readings.payload_age, readings.pose_controller_age, *_delays(readings)),
-        )
+                gains[kind - GAINS][:] = message[3]
         return True
 
-    def _allocate(self) -> None:
-        inputs = self._kept.inputs
-        n = self._joints
-        self.arrays = InputArrays(
-            np.zeros(len(KINDS), dtype=np.bool_),
-            np.zeros(len(KINDS)),
-            *(np.zeros(7), np.zeros(3), np.zeros(n), np.zeros(3)),
-            tuple(self._gains),
-            *(np.zeros(3), np.zeros(3), np.zeros(n), np.zeros(3), inputs._repeats.newest),
-            tuple(inputs._watched[names] for names in self._names),
-            *(np.zeros(len(_NAMES)), np.zeros(3), record(WHOLE, REAL)),
-        )
-
     def store(self) -> None:
-        """Copy the state back."""
-        kept, inputs, a = self._kept, self._kept.inputs, self.arrays
-        m = numbers(a.memory)
-        self._store_messages(m["lift_kept"])
-        kept._read_at = kept._now = m["read_at"]
-        self.store_readings()
-        readings = inputs._readings
-        for name, value in zip(_NAMES, a.values.tolist(), strict=True):
-            setattr(readings, name, value)
-        readings.mocap_position[:] = a.read_position
-        readings.gains[:] = a.largest
-        readings.pose_controller_age = m["pose_controller_age"]
-        readings.round_trip, readings.loop_delay = m["round_trip"], m["loop_delay"]
-        inputs._autopilot = m["autopilot"]
-        inputs._mocap, inputs._joints, inputs._payload = m["mocap"], m["joints"], m["payload"]
-        inputs._moved, inputs._last = m["moved"], m["last"]
-        inputs._bias = (m["bias_first"], m["bias_last"]) if m["bias_known"] else None
-        inputs._bias_mean[:] = a.bias_mean
-        for name in SUBSYSTEMS:
-            inputs._controllers[name] = m[name]
-            if name in inputs._of_pose:
-                inputs._of_pose[name] = m[name]
-        inputs._oldest, inputs._oldest_of_pose = m["oldest"], m["oldest_of_pose"]
-
-    def report(self, stamp: int, delays: tuple[float | None, float | None]) -> None:
-        """Take the report of the tick `stamp` [ns], as `Inputs.autopilot` does; delays [s]: of the
-        link and of the loop."""
-        round_trip, loop_delay = (math.nan if one is None else one for one in delays)
-        m = self.arrays.memory
-        m["autopilot"], m["round_trip"], m["loop_delay"] = stamp / SECOND, round_trip, loop_delay
-
-    def store_readings(self) -> None:
-        """Copy back the readings that the executive of the grasps uses."""
-        a, readings = self.arrays, self._kept.inputs._readings
-        m = a.memory[0].item()
-        readings.stamp, readings.lift, readings.payload_age = m[_LAST], m[_LIFT], m[_PAYLOAD_AGE]
-        readings.payload_position[:] = a.read_payload
-        readings.joint_effort = a.read_effort.copy()
-
-    def _store_messages(self, lift: float) -> None:
-        kept, inputs, a = self._kept, self._kept.inputs, self.arrays
-        kept._kept = {}
-        for kind in np.flatnonzero(a.kept).tolist():
-            at = a.at.item(kind)
+        """Keep the messages of the arrays."""
+        kept, read = self._kept, self._kept.inputs
+        mocap, payload, effort, bias, lift, gains = self._values
+        kept.forget()
+        for kind in np.flatnonzero(self._waits).tolist():
+            name, at, unread = KINDS[kind], self._at.item(kind), np.full(7, math.nan)
             if kind == MOCAP:
-                read, message = kept.mocap, (int(at), a.mocap[:3].copy(), a.mocap[3:].copy())
+                kept.keep(name, kept.mocap, (int(at), mocap[:3].copy(), mocap[3:].copy()))
             elif kind == JOINTS:
-                unread = np.full(self._joints, math.nan)
-                read, message = kept.joints, (int(at), unread, unread, a.effort.copy())
+                kept.keep(name, kept.joints, (int(at), unread, unread, effort.copy()))
             elif kind == PAYLOAD:
-                read, message = kept.payload, (int(at), a.payload.copy(), np.full(4, math.nan))
+                kept.keep(name, kept.payload, (int(at), payload.copy(), unread))
             elif kind == BIAS:
-                read, message = inputs.accelerometer_bias, (at, a.bias.copy())
+                kept.keep(name, read.accelerometer_bias, (at, bias.copy()))
             elif kind == LIFT:
-                read, message = inputs.lift, (lift,)
+                kept.keep(name, read.lift, (lift.item(),))
             else:
-                gains, names = a.gains[kind - GAINS].copy(), self._names[kind - GAINS]
-                read, message = inputs.gains, (at, KINDS[kind], names, gains)
-            kept._kept[KINDS[kind]] = [(read, message, -1)]  # of a tick that is over
+                values = gains[kind - GAINS].copy()
+                kept.keep(name, read.gains, (at, name, self._names[kind - GAINS], values))
 
 
 @borrowing
@@ -230,59 +134,37 @@ def keep_gains(a: InputArrays, controller: int, stamp: int, values: np.ndarray) 
 @borrowing
 def read_inputs(a: InputArrays, stamp: int) -> None:
     """Do what `SupervisorInputs.tick` does at `stamp` [ns]."""
-    m = a.memory[0]
+    m = a.supervisor[0]
     if stamp - m.read_at >= READ_PERIOD:
         m.read_at = stamp
         read_messages(a, stamp)
-    now = stamp / SECOND
-    m.last = now
-    if m.bias_known and now - m.bias_last > STALE:
-        a.values[_CONTRADICTION] = math.nan
-    a.values[_MOCAP_AGE] = now - m.mocap
-    a.values[_STILL] = now - m.moved
-    a.values[_JOINT_AGE] = now - m.joints
-    a.values[_AUTOPILOT_AGE] = now - m.autopilot
-    m.payload_age = now - m.payload
-    a.values[_CONTROLLER_AGE] = now - m.oldest
-    m.pose_controller_age = now - m.oldest_of_pose
-    a.values[_MISSED] = 0.0
+    a.inputs.readings[0].missed_ticks = 0.0
+    take_ages(a.inputs, stamp / SECOND)
 
 
 @borrowing
 def read_messages(a: InputArrays, stamp: int) -> None:
     """Read the kept messages, as `Inputs` does; stamp [ns]: of the reading."""
-    m, kept, at = a.memory[0], a.kept, a.at
-    if kept[MOCAP] and usable((stamp - at[MOCAP]) / SECOND, BRIDGED):
-        m.mocap = at[MOCAP] / SECOND
-        position, quaternion = a.mocap[:3], a.mocap[3:]
-        put(position, a.read_position)
-        if not repeated(position, quaternion, a.newest):
-            m.moved = m.mocap
+    m, kept, at, inputs = a.inputs.numbers[0], a.kept, a.at, a.inputs
+    if kept[MOCAP]:
+        exposed = at[MOCAP] / SECOND
+        if counts(a.clock, exposed, stamp / SECOND, BRIDGED):
+            take_pose(inputs, exposed, a.mocap[:3], a.mocap[3:])
     if kept[JOINTS]:
         m.joints = at[JOINTS] / SECOND
-        put(a.effort, a.read_effort)
+        put(a.effort, inputs.effort)
     if kept[PAYLOAD]:
         m.payload = at[PAYLOAD] / SECOND
-        put(a.payload, a.read_payload)
+        put(a.payload, inputs.payload)
     if kept[BIAS]:
-        if not m.bias_known:
-            m.bias_known, m.bias_first, m.bias_last = 1, at[BIAS], at[BIAS]
-            put(a.bias, a.bias_mean)
-        away = follow_bias(at[BIAS], m.bias_first, m.bias_last, a.bias, a.bias_mean)
-        m.bias_last = at[BIAS]
-        a.values[_CONTRADICTION] = away
+        take_bias(inputs, at[BIAS], a.bias)
     if kept[LIFT]:
-        m.lift = m.lift_kept
+        inputs.readings[0].lift = a.lift[0]
     if kept[GAINS]:
-        a.largest[0] = largest_of(a.gains[0], a.watched[0])
-        m.position = at[GAINS]
+        take_gains(inputs, 0, at[GAINS], a.gains[0], a.watched[0])
     if kept[GAINS + 1]:
-        a.largest[1] = largest_of(a.gains[1], a.watched[1])
-        m.attitude = at[GAINS + 1]
+        take_gains(inputs, 1, at[GAINS + 1], a.gains[1], a.watched[1])
     if kept[GAINS + 2]:
-        a.largest[2] = largest_of(a.gains[2], a.watched[2])
-        m.arm = at[GAINS + 2]
-    m.oldest = min(m.position, m.attitude, m.arm)
-    m.oldest_of_pose = min(m.position, m.attitude)
+        take_gains(inputs, 2, at[GAINS + 2], a.gains[2], a.watched[2])
     for kind in range(len(kept)):
         kept[kind] = False

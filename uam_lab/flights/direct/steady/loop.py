@@ -154,11 +154,11 @@ def begin_tick(a: TickArrays) -> int:
     if take_sample(a.estimation, stamp, sample[0:3], sample[3:6]) != STATE:
         return BLIND
     c[STAMP] = stamp
+    read_inputs(i, stamp)
     if a.estimation.numbers[0].bias_due:
         write_biases(a.estimation.estimator.pose.memory, a.bias)
         i.kept[BIAS], i.at[BIAS] = True, stamp / SECOND
         put(a.bias[1], i.bias)
-    read_inputs(i, stamp)
     c[BEGUN] = stamp
     a.reference.memory[0].begun = a.reference.memory[0].time
     for row in range(len(a.flown)):

@@ -32,12 +32,13 @@ STATES = (State.TAKING_OFF, State.FLYING, State.LANDING)
 
 class ReferenceArrays(NamedTuple):
     """State of the mission. motions (MOST, 5, 6 + n), times (MOST,) [s]: ahead, on the path;
-    bounds, values: of the checks; memory: WHOLE, REAL."""
+    readings, bounds, values: of the checks; memory: WHOLE, REAL."""
 
     reference: np.ndarray
     motions: np.ndarray
     times: np.ndarray
     drag: np.ndarray
+    readings: np.ndarray
     bounds: np.ndarray
     values: np.ndarray
     memory: np.ndarray
@@ -166,6 +167,7 @@ class ReferencePart:
             self._motions,
             self._times,
             guidance._drag,
+            self._stage.inputs.readings.values,
             checks._bounds,
             checks._values,
             self.memory,
@@ -259,12 +261,13 @@ def _on_path(guidance: Guidance, stamp: float) -> bool:
 @borrowing
 def advance(r: ReferenceArrays, inputs: InputArrays, stamp: int, state: np.ndarray) -> bool:
     """Do what `MissionStage.advance` does at `stamp` [ns]; False, and nothing, where it decides."""
-    m, i = r.memory[0], inputs.memory[0]
-    link, late = SYMMETRIC * i.round_trip, i.loop_delay - m.delay_nominal
+    m, i = r.memory[0], inputs.inputs
+    readings = i.readings[0]
+    link, late = SYMMETRIC * readings.round_trip, readings.loop_delay - m.delay_nominal
     loop = 0.0 if late < 0.0 else late
     calm = measure_all(
-        *(state, r.reference, inputs.read_position, m.ground, inputs.values),
-        *(inputs.read_effort, inputs.largest, link, loop, r.bounds, m.joints, r.values),
+        *(state, r.reference, i.position, m.ground, r.readings),
+        *(i.effort, i.gains, link, loop, r.bounds, m.joints, r.values),
     )
     time, ahead = r.times[m.advanced], stamp + m.period
     now = ahead / SECOND

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from operator import is_
@@ -17,9 +18,10 @@ from uam_control.stages.bridge_stage import BridgeStage
 from uam_control.stages.control_tick import STAGES, ControlTick, take_report
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.mission_stage import MissionStage
+from uam_control.stamps import SECOND
 from uam_lab.flights.direct.record import TickRecorder
 from uam_lab.flights.direct.steady.bridge import bridge_arrays
-from uam_lab.flights.direct.steady.inputs import InputsPart
+from uam_lab.flights.direct.steady.inputs import KeptMessages
 from uam_lab.flights.direct.steady.laws import law_arrays
 from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
 from uam_lab.flights.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
@@ -76,7 +78,7 @@ class SteadyTicks:
         if not all(map(counts_references, self._steps)):  # a law of somebody's own
             self.able = False
             return
-        self._inputs = InputsPart(stages.mission.inputs, self._controllers, plant.joints)
+        self._inputs = KeptMessages(stages.mission.inputs, self._controllers, plant.joints)
         self._reference = ReferencePart(stages.mission)
         self._sent = np.zeros(2)
         self._counts, self._biases = np.zeros(6, dtype=np.int64), np.zeros((2, 3))
@@ -116,7 +118,6 @@ class SteadyTicks:
             done, end = loop(count - reference.advanced, begin)
             flown += done
             if end == WATCH:
-                self._inputs.store_readings()
                 if not reference.watch(state):
                     break
                 begin = RECORD
@@ -134,8 +135,10 @@ class SteadyTicks:
         stamp = self._counts.item(STAMP)
         report = self._report()
         if report is not None:
-            self._inputs.report(stamp, (report.round_trip, report.loop_delay))
-            self._flight.control.measured_delay.report(stamp, report.loop_delay)
+            stages, delays = self._flight.control, (report.round_trip, report.loop_delay)
+            known = (math.nan if one is None else one for one in delays)
+            stages.mission.inputs.inputs.autopilot(stamp / SECOND, *known)
+            stages.measured_delay.report(stamp, report.loop_delay)
         most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
         most = min(most, self._flight.plant.draw_noise(), self._ticks_to_report(stamp))
         return self._reference.renew(self._flight.control.signals.state, most)
@@ -189,6 +192,7 @@ class SteadyTicks:
         made = (
             flight.recorder.table.values,
             *(one.arrays for one in self._controllers),
+            stages.mission.inputs.inputs.arrays,
             *(stages.bridge.map.curve, flight.autopilot.autopilot.arrays),
             *(stages.mission.mission._guidance, stages.mission.mission._parameters),
         )
@@ -199,7 +203,7 @@ class SteadyTicks:
             arrays = TickArrays(
                 flight.plant.arrays,
                 stages.estimator.arrays,
-                self._inputs.arrays,
+                self._inputs.arrays(),
                 law_arrays(stages),
                 bridge_arrays(stages.bridge, flight.autopilot, self._sent),
                 self._reference.arrays(),
