@@ -159,6 +159,7 @@ def test_what_is_known_to_be_wrong_does_not_reach_the_autopilot(seed, texts):
         (3, "mocap_swap@carry+0.2"),
         (5, "mocap_swap@carry+0:axes=yz"),
         (7, "mocap_swap@carry+0.2+3:axes=xz"),
+        (2, "mocap_swap@take-off+1.085"),  # a contradiction in the open: no blind flight
     ],
 )
 def test_wrong_poses_are_not_followed_before_the_vehicle_is_down(seed, text):

@@ -19,6 +19,7 @@ from uam_control.mission.shift import Shift
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive
+ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
 
 
 class WithoutDescent:
@@ -152,12 +153,17 @@ class PayloadWatch:
         guidance.trajectory.write(time, motion)
         return magnet_and_lever(motion[CHI], self._mount, self._links, length)[0]
 
+    def above_stand(self, chi: np.ndarray) -> bool:
+        """Whether a level descent from chi (6 + n,) may come down on a stand."""
+        near = ABOVE * self._parameters.clear_distance
+        return any(math.hypot(chi[0] - x, chi[1] - y) < near for x, y in self._stands)
+
     def clear(self, chi: np.ndarray) -> np.ndarray:
         """Return the way (3,) [m] from chi (6 + n,) up and away from a stand nearby, else zeros."""
         p, way = self._parameters, np.zeros(3)
         for stand in self._stands:
             beside = chi[:Z] - stand
-            distance = max(float(np.hypot(*beside)), 1e-6)
+            distance = max(math.hypot(*beside), 1e-6)
             if distance < p.clear_distance:
                 way[:Z] = (p.clear_distance / distance - 1.0) * beside
                 way[Z] = p.clear_height
