@@ -21,6 +21,7 @@ UNAIDED = 0.5  # without a pose for so long an estimate may be far off, in the a
 LAND = 0.75  # reports of autopilot and bridge: the vehicle lands
 FAILSAFE = 1.0  # poses, and the estimate: the autopilot descends by itself
 BRIDGED = FAILSAFE  # poses: the estimate's past reaches back so far; an older one is none for all
+REJECTED_LATE = 2.0  # poses off the estimate and older than FORWARDED: for so long rejected
 DISCONNECTED = 3.0  # heartbeats of the autopilot
 REJECTED = 10.0  # poses off the estimate: for so long; a failsafe is on the ground before
 OTHER_CLOCK = 10.0  # stamps: of a clock that the autopilot does not know, not of an old pose

@@ -68,7 +68,11 @@ PROFILES = [
     (PROFILE.format(inertia="[2.2, 2.2, -1.0]"), "position_controller: inertia", "outside"),
     (PROFILE.format(inertia="[2.2, 2.2, 0.0]"), "position_controller: inertia", "outside"),
     (PROFILE.format(inertia="[2.2, .nan, 1.0]"), "position_controller: inertia", "outside"),
-    (PROFILE.format(inertia="[2.2, 2.2, 2.2]").replace("nu:", "nuu:"), "nuu: unknown", "allowed"),
+    (
+        PROFILE.format(inertia="[2.2, 2.2, 2.2]").replace("nu:", "nuu:"),
+        "nuu: unknown",
+        "did you mean nu?",
+    ),
 ]
 
 

@@ -217,7 +217,7 @@ def test_a_red_check_refuses_the_start_in_words():
     flight.step()
     accepted, words = flight.mission.start()
     assert not accepted and words == (
-        "refused: mocap: unknown (at most 0.25 s); arm: 0.4 rad (at most 0.3 rad from its start)"
+        "refused: mocap: unknown (at most 0.1 s); arm: 0.4 rad (at most 0.3 rad from its start)"
     )
     assert not flight.step().arm
     flight.readings, flight.state[0, 7] = KNOWN, START[7]

@@ -37,7 +37,7 @@ def test_all_green_without_a_fault():
     found = report()
     assert all(check.passed for check in found.values()), found
     assert found["battery"].value == "unknown"
-    assert found["mocap"].text == "mocap: 0.01 s (at most 0.25 s)"
+    assert found["mocap"].text == "mocap: 0.01 s (at most 0.1 s)"
     assert "position error" not in found  # of a flight
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.ages import BRIDGED
+from uam_control.ages import BRIDGED, FORWARDED, REJECTED, REJECTED_LATE
 from uam_control.coordinates import Z
 from uam_control.estimation.history import OLDEST_MATCH, value_at
 from uam_control.estimation.pose_clock import PoseClock, counts, forget_clock, waits
@@ -269,7 +269,9 @@ def correct_stored(
     for i in range(3):
         jump += (position[i] - predicted[i]) ** 2
         bias += motion.accelerometer_bias[i] ** 2
-    if rejects(a.gate, stamp, math.sqrt(jump), math.sqrt(bias)):
+    # late poses: the estimate without them is less certain than they are
+    longest = REJECTED if last - stamp <= FORWARDED else REJECTED_LATE
+    if rejects(a.gate, stamp, math.sqrt(jump), math.sqrt(bias), longest):
         return
     since, dt = last - compared, FIRST
     step = max(gap, LATE_SHARE * since)

@@ -35,7 +35,7 @@ class PoseGate:
 
     def __call__(self, stamp: float, distance: float, bias: float) -> bool:
         """See `rejects`."""
-        return rejects(self.memory, stamp, distance, bias)
+        return rejects(self.memory, stamp, distance, bias, REJECTED)
 
     def suspend(self, stamp: float) -> None:
         """See `suspend`."""
@@ -56,12 +56,11 @@ def forget_rejections(gate: np.ndarray) -> None:
 
 
 @borrowing
-def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float) -> bool:
-    """Return whether to reject the pose at `stamp` [s]; gate: see
-    `forget_rejections`.
+def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float, longest: float) -> bool:
+    """Return whether to reject the pose at `stamp` [s]; gate: see `forget_rejections`.
 
     distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
-    estimated accelerometer bias.
+    estimated accelerometer bias; longest [s]: of a rejection.
     """
     m = gate[0]
     if stamp - m.last > UNAIDED:
@@ -75,7 +74,7 @@ def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float) -> boo
         return False
     if math.isnan(m.rejecting_since):
         m.rejecting_since = stamp
-    if stamp - m.rejecting_since > REJECTED:
+    if stamp - m.rejecting_since > longest:
         m.rejecting_since = math.nan
         suspend(gate, stamp)
         return False
