@@ -46,6 +46,7 @@ def test_a_closed_terminal_ends_in_order(tmp_path):
     ours, theirs = pty.openpty()
 
     def lead():
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run below nohup
         os.setsid()
         os.ttyname(0)  # the terminal of a session leader becomes its controlling one
         os.close(os.open(os.ttyname(0), os.O_RDWR))
