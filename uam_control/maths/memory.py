@@ -20,9 +20,8 @@ def record(whole: str, real: str = "", rows: int = 1) -> np.ndarray:
         raise ValueError(f"not a name of a number: {', '.join(taken)}")
     fields = [(name, np.int64) for name in whole.split()]
     fields += [(name, np.float64) for name in real.split()]
-    return np.zeros(
-        rows, np.dtype((np.record, fields))
-    )  # fields are attributes in plain Python, too
+    # fields are attributes in plain Python, too
+    return np.zeros(rows, np.dtype((np.record, fields)))
 
 
 def numbers(memory: np.ndarray) -> dict[str, int | float]:

@@ -387,7 +387,7 @@ class Mission:
         seen.on_ground = touchdown.on_ground(state, self._ground, p)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.end_mission = self._over
-        seen.beside_stand = self._watch.above_stand(state[CHI])
+        seen.above_stand = self._watch.above_stand(state[CHI])
         seen.off_path = planned = guidance.planned
         seen.landing_due = time >= landing.at and not planned and guidance.goes_on
         seen.arrived = planned and guidance.arrived(stamp)

@@ -156,7 +156,7 @@ class PayloadWatch:
     def above_stand(self, chi: np.ndarray) -> bool:
         """Whether a level descent from chi (6 + n,) may come down on a stand."""
         near = ABOVE * self._parameters.clear_distance
-        return any(math.hypot(chi[0] - x, chi[1] - y) < near for x, y in self._stands)
+        return any(math.hypot(*(chi[:Z] - stand)) < near for stand in self._stands)
 
     def clear(self, chi: np.ndarray) -> np.ndarray:
         """Return the way (3,) [m] from chi (6 + n,) up and away from a stand nearby, else zeros."""

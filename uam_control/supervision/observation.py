@@ -91,7 +91,7 @@ class Observation:
     armed: by the autopilot's report. authority: who has control. ready: the mission allows the
     take-off. landing_due: the scenario's landing has begun. on_ground: low and slow now; touchdown:
     on the ground for touchdown_time; overdue: no touchdown in the allowed time. off_path: a goal or
-    trajectory replaces the scenario's path; arrived: its end is reached. beside_stand: a level
+    trajectory replaces the scenario's path; arrived: its end is reached. above_stand: a level
     descent may come down on a stand. end_mission: why the mission lands before its end, or "".
     """
 
@@ -107,6 +107,6 @@ class Observation:
     overdue: bool = False
     off_path: bool = False
     arrived: bool = False
-    beside_stand: bool = False
+    above_stand: bool = False
     end_mission: str = ""
     readings: Readings = field(default_factory=Readings)

@@ -314,7 +314,7 @@ class Supervisor:
         if self.state is State.BLIND:  # it goes on with its landing, or its hold, afterwards
             self._interrupted, self._failed = source, finding.name
         elif self.state is State.FAILSAFE:
-            if self._failed == POSES_OFF:  # the estimator soon follows poses that stay away
+            if self._failed == POSES_OFF:  # in the end the estimator follows them
                 self._failed = ""
         else:
             self._planned = event is Event.LANDING_DUE
@@ -348,12 +348,12 @@ class Supervisor:
     def _flies_on(self, finding: ExceededLimit, seen: Observation) -> bool:
         """Whether the vehicle flies blind first.
 
-        With a contradiction only beside a stand, where the level descent of a failsafe topples it:
+        With a contradiction only above a stand, where the level descent of a failsafe topples it:
         if the IMU is right and the poses are wrong, every second more leads away.
         """
         began = self.state is State.BLIND and self._failed == finding.name
-        beside = finding.name == CONTRADICTION and seen.beside_stand
-        return finding.blind or began or beside
+        above = finding.name == CONTRADICTION and seen.above_stand
+        return finding.blind or began or above
 
     def _agrees(self) -> Event:
         """Return the event of poses that agree again: a take-off given up, or a landing, lands."""
