@@ -69,10 +69,12 @@ class Switch:
 
 @dataclass(frozen=True)
 class Text:
-    """Meaning of a parameter that is a text; allowed: its form, for the user."""
+    """Meaning of a parameter that is a text; allowed: its form, for the user; a secret one is
+    never shown."""
 
     description: str
     allowed: str
+    secret: bool = False
 
 
 Spec = Bound | Choice | Switch | Text
@@ -117,9 +119,9 @@ def switch(default: bool, description: str) -> Any:
     return field(default=default, metadata={"spec": Switch(description)})
 
 
-def text(default: str, description: str, allowed: str) -> Any:
-    """Declare a field that is a text; allowed: its form, for the user."""
-    return field(default=default, metadata={"spec": Text(description, allowed)})
+def text(default: str, description: str, allowed: str, secret: bool = False) -> Any:
+    """Declare a field that is a text; see `Text`."""
+    return field(default=default, metadata={"spec": Text(description, allowed, secret)})
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,8 @@ class ParameterSet:
             elif isinstance(spec, Switch) and not isinstance(value, bool):
                 raise ParameterError(f"{name}: {value!r} is not true or false")
             elif isinstance(spec, Text) and not isinstance(value, str):
-                raise ParameterError(f"{name}: {value!r} is no text; allowed: {spec.allowed}")
+                what = "the value" if spec.secret else repr(value)
+                raise ParameterError(f"{name}: {what} is no text; allowed: {spec.allowed}")
         checked = replace(self, **clean)
         checked.check_together()
         return checked

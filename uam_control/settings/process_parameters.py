@@ -84,3 +84,12 @@ def cores_of(given: str) -> frozenset[int]:
             raise ParameterError(f"cores: {last} is above {HIGHEST_CORE}")
         found.update(range(int(first), int(last) + 1))
     return frozenset(found)
+
+
+@dataclass(frozen=True)
+class DeviceWait(ParameterSet):
+    """What a driver does without its device; it cannot change while the node runs."""
+
+    wait_for_device: bool = switch(
+        False, "a device that is absent at the start: true: wait for it; false: refuse to start"
+    )

@@ -30,6 +30,7 @@ from uam_control.settings.visible_text import visible
 from uam_msgs_py.node.namespace import shared_section
 
 S = TypeVar("S", bound=ParameterSet)
+SECRET = "set"  # shown in place of a secret
 
 
 def descriptor(spec: Spec, read_only: bool, axes: Sequence[str] = ()) -> ParameterDescriptor:
@@ -98,6 +99,8 @@ class NodeParameters(Generic[S]):
         self.current = kind.from_mapping(follows | base | own, self._axes)
         for name, spec in kind.specs().items():
             value = getattr(self.current, name)
+            if getattr(spec, "secret", False) and value:
+                value = SECRET
             node.declare_parameter(
                 name,
                 list(value) if isinstance(value, tuple) else value,
@@ -129,18 +132,16 @@ class NodeParameters(Generic[S]):
             self.apply(new)
 
 
-def declared_text(node: Node, name: str, default: str, spec: Text, secret: bool = False) -> str:
-    """Declare a read-only text parameter and return its value; a secret is shown as 'set'.
+def declared_text(node: Node, name: str, default: str, spec: Text) -> str:
+    """Declare a read-only text parameter and return its value.
 
     For texts that a node needs outside a ParameterSet. Raises ParameterError if the value is no
     text, for example a key that YAML reads as a number.
     """
     value = given(node).get(name, default)
     if not isinstance(value, str):
-        what = "the value" if secret else repr(value)
-        raise ParameterError(f"{name}: {what} is no text; allowed: {spec.allowed}")
-    shown = "set" if secret and value else value
-    node.declare_parameter(name, shown, descriptor(spec, read_only=True), ignore_override=True)
+        raise ParameterError(f"{name}: {value!r} is no text; allowed: {spec.allowed}")
+    node.declare_parameter(name, value, descriptor(spec, read_only=True), ignore_override=True)
     return value
 
 

@@ -4,25 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from uam_control.settings.parameter_set import ParameterSet, switch
+from uam_control.settings.process_parameters import DeviceWait
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 PERIOD = 1.0  # [s] between two attempts
 
 Device = TypeVar("Device")
-
-
-@dataclass(frozen=True)
-class DeviceWait(ParameterSet):
-    """What a driver does without its device; it cannot change while the node runs."""
-
-    wait_for_device: bool = switch(
-        False, "a device that is absent at the start: true: wait for it; false: refuse to start"
-    )
 
 
 class LateDevice(Generic[Device]):

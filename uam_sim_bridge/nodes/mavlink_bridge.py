@@ -66,8 +66,9 @@ from uam_sim_bridge.nodes.autopilot_imu_topic import (
     CompanionClock,
 )
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
-from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
+from uam_sim_bridge.nodes.bridge_link import open_links
 from uam_sim_bridge.nodes.bridge_magnet import bridge_magnet
+from uam_sim_bridge.nodes.bridge_parameters import BridgeParameters
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 
 NAME = "mavlink_bridge"
@@ -109,7 +110,7 @@ class MavlinkBridgeNode(UamNode):
             clock = CompanionClock(self, options.imu_clock == "topic")
             own_imu = 1.0 / vehicle.control_period, clock.now
             self.wake_up = IMU_WAKE_UP
-        links = open_links(self, options, sequence, mapping.current, *own_imu)
+        links = open_links(options, sequence, mapping.current, *own_imu)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         self._late = links.late
         self._early = links.waits and not own_imu  # the link is served before the first tick

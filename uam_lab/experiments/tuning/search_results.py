@@ -44,8 +44,9 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
     evaluations = len(study.get_trials(deepcopy=False, states=DONE))
     head = [
         f"Found by: {command}",
-        f"Study {study.study_name}: evaluation {best.number} of {evaluations}, {in_words(best)} "
-        f"(start: {in_words(evaluated_start(space, study))}), from profile {space.start.name}.",
+        f"Study {study.study_name}, {evaluations} evaluations, best of them {best.number}: "
+        f"{in_words(best)} (start: {in_words(evaluated_start(space, study))}), "
+        f"from profile {space.start.name}.",
         f"Vehicle: {space.start.vehicle.name}.",
         "Flights of an evaluation: "
         + "; ".join(

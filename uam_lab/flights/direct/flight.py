@@ -29,6 +29,7 @@ from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
+from uam_sim_bridge.nodes.bridge_parameters import check_names
 from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
@@ -68,6 +69,7 @@ class DirectFlight:
         self.plant = make_plant(*started, faults or Schedule(), plant)
         self._faults = DirectFaults(faults, self.plant) if faults else None
         described, section = vehicle.description, profile.section("mavlink_bridge")
+        check_names(profile)
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         self.autopilot = JoinedAutopilot(Autopilot(Parameters.of(described)), self.sequence)
         bridge = BridgeStage(
