@@ -6,52 +6,42 @@ import math
 from set_clock import SetClock
 
 from uam_control.vehicle import load_description
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.port import PatientPort
-from uam_sim_bridge.devices.dynamixel.servo_bus import ServoBus
+from uam_sim_bridge.devices.serial.serial_port import SerialPort
 
 BAUD = 1_000_000
 STOWED = (0.0, math.pi / 2)
 PATIENT = 30.0  # [s] for an answer on a pseudo-terminal: on a busy machine it may take long
 
 
-class LinePort(PatientPort):
+class LinePort(SerialPort):
     """The driver's port joined to the servos: an answer is there at once, or never."""
 
     def __init__(self, line):
         super().__init__("line", allowance=0.0)
-        self.line, self.plugged, self._bytes = line, True, b""
+        self.line, self.plugged, self.received = line, True, b""
         self.written = []  # packets
 
-    def setBaudRate(self, baudrate):
+    def open(self, baud_rate):
         self._check()
-        self.baudrate, self.is_open = baudrate, True
-        return True
+        self.baud_rate = baud_rate
 
-    def closePort(self):
-        self.is_open = False
+    def close(self):
+        pass
 
-    def clearPort(self):
+    def send(self, data):
         self._check()
-        self._bytes = b""
+        self.written.append(data)
+        self.received = b"".join(answer for _, answer in self.line.receive(data, self.baud_rate))
 
-    def writePort(self, packet):
+    def read(self):
         self._check()
-        self.written.append(bytes(packet))
-        for _, answer in self.line.receive(bytes(packet), self.baudrate):
-            self._bytes += answer
-        return len(packet)
-
-    def readPort(self, length):
-        self._check()
-        data, self._bytes = self._bytes[:length], self._bytes[length:]
+        data, self.received = self.received, b""
         return data
-
-    def isPacketTimeout(self):
-        return not self._bytes
 
     def _check(self):
         if not self.plugged:
@@ -110,6 +100,6 @@ def described(device="line", **changes):
 
 def raw_bus(line):
     """A bus without driver on the line."""
-    bus = ServoBus("line", BAUD, 0.0, LinePort(line))
+    bus = DynamixelBus("line", BAUD, 0.0, LinePort(line))
     bus.open()
     return bus

@@ -15,7 +15,7 @@ from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
 from uam_sim_bridge.devices.dynamixel.goals import goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost
+from uam_sim_bridge.devices.servo_bus import BusLost
 
 UNIT = 0.00269 * 1.304  # [N m] of one count of current
 

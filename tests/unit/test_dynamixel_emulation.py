@@ -6,17 +6,16 @@ import time
 
 import pytest
 from arm_rig import BAUD, PATIENT, ArmRig, LinePort, described, raw_bus
-from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, Protocol2PacketHandler
+from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PortHandler, Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
 from set_clock import SetClock
 
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.control_table import (
     ControlTableError,
     control_table,
     model_numbers,
-    signed,
-    unsigned,
 )
 from uam_sim_bridge.devices.dynamixel.emulated import (
     ArmShafts,
@@ -27,13 +26,13 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     ServoLine,
     StillShaft,
 )
-from uam_sim_bridge.devices.dynamixel.hardware_errors import (
+from uam_sim_bridge.devices.dynamixel.health import (
     ERROR_BITS,
     advice,
     hardware_errors,
 )
-from uam_sim_bridge.devices.dynamixel.port import PatientPort
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost, NoAnswer, Refused, ServoBus
+from uam_sim_bridge.devices.serial.serial_port import SerialPort
+from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, word
 
 TABLE = control_table("xm430_w210")
 TORQUE, MODE, CURRENT = TABLE["Torque Enable"], TABLE["Operating Mode"], TABLE["Goal Current"]
@@ -91,9 +90,9 @@ def test_an_unknown_model_or_register_is_refused_in_one_line():
 
 
 @given(st.integers(1, 4), st.data())
-def test_signed_and_unsigned_are_inverse(size, data):
+def test_a_signed_value_is_its_bytes(size, data):
     value = data.draw(st.integers(-(1 << 8 * size - 1), (1 << 8 * size - 1) - 1))
-    assert signed(unsigned(value, size), size) == value
+    assert int.from_bytes(word(value, size), "little", signed=True) == value
 
 
 def test_ping_scan_and_states(bus):
@@ -117,9 +116,29 @@ def test_sync_read_brings_every_servo(bus, line, fast):
     assert bus.sync_read(span, [1, 2], fast) == {}  # the second waits for the first
 
 
+class SdkPort(PortHandler):
+    """The line as a port of the maker's library."""
+
+    def __init__(self, line):
+        super().__init__("line")
+        self.joined = LinePort(line)
+        self.joined.open(BAUD)
+
+    def clearPort(self):
+        pass
+
+    def writePort(self, packet):
+        self.joined.send(bytes(packet))
+        return len(packet)
+
+    def readPort(self, length):
+        data = self.joined.received[:length]
+        self.joined.received = self.joined.received[length:]
+        return data
+
+
 def test_the_librarys_own_sync_read_agrees(line):
-    port = LinePort(line)
-    port.setBaudRate(BAUD)
+    port = SdkPort(line)
     group = GroupSyncRead(port, Protocol2PacketHandler(), 126, 10)
     group.addParam(1)
     group.addParam(2)
@@ -328,7 +347,7 @@ def device(tmp_path):
 
 
 def test_the_library_reads_servos_behind_a_device(device):
-    bus = ServoBus(device.port, BAUD, PATIENT)
+    bus = DynamixelBus(device.port, BAUD, PATIENT)
     bus.open()
     order = random.Random(1)
     for _ in range(30):
@@ -344,7 +363,7 @@ def test_the_answers_take_their_time_on_the_wire():
     """At 57600 baud, with return delay and latency timer; a sleep is never too short."""
     servo = EmulatedServo(1, StillShaft())
     with EmulatedBus([servo], timing=True, latency_timer=0.016) as device:
-        bus = ServoBus(device.port, 57600, PATIENT)
+        bus = DynamixelBus(device.port, 57600, PATIENT)
         bus.open()
         begun = time.monotonic()
         bus.read(1, TABLE["Present Position"])
@@ -354,7 +373,7 @@ def test_the_answers_take_their_time_on_the_wire():
 
 
 def test_the_speed_of_the_host_is_that_of_the_device(device):
-    bus = ServoBus(device.port, 57600, 0.05)
+    bus = DynamixelBus(device.port, 57600, 0.05)
     bus.open()
     with pytest.raises(NoAnswer):
         bus.ping(1)
@@ -362,7 +381,7 @@ def test_the_speed_of_the_host_is_that_of_the_device(device):
 
 
 def test_unplug_and_plug_in(device):
-    bus = ServoBus(device.port, BAUD, PATIENT)
+    bus = DynamixelBus(device.port, BAUD, PATIENT)
     bus.open()
     bus.ping(1)
     device.unplug()
@@ -377,12 +396,11 @@ def test_unplug_and_plug_in(device):
     bus.close()
 
 
-def test_the_port_waits_no_longer_than_for_its_bytes(monkeypatch):
-    """Not the SDK's 34 ms: bytes sent and expected, and the allowance."""
-    port = PatientPort("none", allowance=0.002)
-    port.tx_time_per_byte = 0.01  # [ms]
-    port._sent = 20
-    port.setPacketTimeout(30)
-    assert port.packet_timeout == pytest.approx(0.5 + 2.0)
-    port.setPacketTimeout(30)
-    assert port.packet_timeout == pytest.approx(0.3 + 2.0)
+def test_the_port_waits_no_longer_than_for_its_bytes(device):
+    """Bytes sent and expected, and the allowance."""
+    port = SerialPort(device.port, allowance=0.002)
+    port.open(1_000_000)  # 10 us for a byte
+    port.send(bytes(20))
+    assert port.expect(30) == pytest.approx(0.0005 + 0.002)
+    assert port.expect(30) == pytest.approx(0.0003 + 0.002)
+    port.close()

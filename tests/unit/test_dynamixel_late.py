@@ -5,10 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from set_clock import SetClock
 
+from uam_sim_bridge.devices.dynamixel.bus import LATEST, DynamixelBus, Instruction, Overdue
 from uam_sim_bridge.devices.dynamixel.control_table import control_table
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
-from uam_sim_bridge.devices.dynamixel.overdue import LATEST, Instruction, Overdue
-from uam_sim_bridge.devices.dynamixel.servo_bus import NoAnswer, ServoBus
+from uam_sim_bridge.devices.dynamixel.protocol import READ, Packet
+from uam_sim_bridge.devices.servo_bus import NoAnswer
 
 TABLE = control_table("xm430_w210")
 # of one byte, two and four: each with another content
@@ -34,13 +35,11 @@ class LatePort(LinePort):
         self.fates = []  # of the next answers: number of waits, LOST or DAMAGED
         self._waits, self._under_way = 0, []
 
-    def clearPort(self):
+    def send(self, data):
         """The device is not emptied: bytes under way come all the same."""
-
-    def writePort(self, packet):
-        before, self._bytes = self._bytes, b""
-        super().writePort(packet)
-        answer, self._bytes = self._bytes, before
+        before = self.received
+        super().send(data)
+        answer, self.received = self.received, before
         fate = self.fates.pop(0) if self.fates and answer else 0
         if fate == LOST:
             answer = b""
@@ -50,18 +49,17 @@ class LatePort(LinePort):
             last = self._under_way[-1][0] if self._under_way else 0
             self._under_way.append((max(last, self._waits + fate), answer))
         self._deliver()
-        return len(packet)
 
-    def isPacketTimeout(self):
-        if self._bytes:
-            return False
-        self._waits += 1
-        self._deliver()
-        return True
+    def read(self):
+        data = super().read()
+        if not data:
+            self._waits += 1
+            self._deliver()
+        return data
 
     def _deliver(self):
         while self._under_way and self._under_way[0][0] <= self._waits:
-            self._bytes += self._under_way.pop(0)[1]
+            self.received += self._under_way.pop(0)[1]
 
 
 def late_bus():
@@ -69,7 +67,7 @@ def late_bus():
     for name, value in CONTENTS.items():
         servo.set(name, value)
     port = LatePort(ServoLine([servo]))
-    bus = ServoBus("line", BAUD, 0.0, port)
+    bus = DynamixelBus("line", BAUD, 0.0, port)
     bus.open()
     return bus, port
 
@@ -122,8 +120,8 @@ def test_after_a_silence_the_bus_answers_as_before():
 
 def test_an_overdue_answer_is_forgotten_after_its_time():
     clock = SetClock(100.0)
-    overdue, one = Overdue(clock), Instruction(1, 2, b"\x08\x00\x01\x00", 1)
-    other = Instruction(1, 2, b"\x09\x00\x01\x00", 1)
+    overdue, one = Overdue(clock), Instruction(Packet(1, READ, b"\x08\x00\x01\x00"), 1)
+    other = Instruction(Packet(1, READ, b"\x09\x00\x01\x00"), 1)
     overdue.add(one)
     assert overdue and not overdue.answers(other, 1, b"\x05", False)  # the late one
     assert not overdue and overdue.answers(other, 1, b"\x05", False)

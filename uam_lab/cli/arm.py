@@ -15,6 +15,7 @@ from uam_lab.cli.command import Command
 from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.chain import (
     SPEEDS,
     ArmChain,
@@ -22,10 +23,9 @@ from uam_sim_bridge.devices.dynamixel.chain import (
 )
 from uam_sim_bridge.devices.dynamixel.control_table import model_name
 from uam_sim_bridge.devices.dynamixel.driver import NEEDED_LATENCY, ArmDriver
-from uam_sim_bridge.devices.dynamixel.hardware_errors import advice
+from uam_sim_bridge.devices.dynamixel.health import advice
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.servo_bus import ServoBus
-from uam_sim_bridge.devices.dynamixel.startup import tried
+from uam_sim_bridge.devices.servo_bus import tried
 
 AS_DESCRIBED, OTHERWISE = 0, 1
 EXAMPLES = """\
@@ -134,7 +134,7 @@ def state(driver: ArmDriver, i: int) -> tuple[str, ...]:
 
 def scan(chain: ArmChain, wait: float) -> int:
     """Print ids and models at every baud rate. Raises BusLost."""
-    bus, found = ServoBus(chain.device, SPEEDS[0], wait), 0
+    bus, found = DynamixelBus(chain.device, SPEEDS[0], wait), 0
     try:
         for speed in SPEEDS:
             bus.set_baud_rate(speed)

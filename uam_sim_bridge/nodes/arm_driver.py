@@ -39,7 +39,7 @@ from uam_sim_bridge.devices.dynamixel.chain import (
 )
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver, Reading
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost
+from uam_sim_bridge.devices.servo_bus import BusLost
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.paced_clock import PacedClock
 

@@ -12,10 +12,10 @@ from uam_lab.preflight.doctor.finding import Finding, fail, ok
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost
 from uam_sim_bridge.devices.mocap import live
 from uam_sim_bridge.devices.mocap.frame import MocapError
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters, open_source
+from uam_sim_bridge.devices.servo_bus import BusLost
 
 SLOW_ANSWER = 0.05  # [s] of a servo: this computer may be busy
 

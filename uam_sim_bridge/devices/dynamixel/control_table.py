@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from uam_sim_bridge.devices.servo_bus import Register
+
 FIRST_RAM = 64  # addresses below are EEPROM: written with torque off only
 BAUD_RATES = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000)  # by register value
 
@@ -48,19 +50,6 @@ class ControlTableError(ValueError):
 
 
 @dataclass(frozen=True)
-class Register:
-    """One entry: address and size in bytes."""
-
-    address: int
-    size: int
-
-    @property
-    def end(self) -> int:
-        """First address behind the entry."""
-        return self.address + self.size
-
-
-@dataclass(frozen=True)
 class ControlTable:
     """Registers of a model by name, and the units of position and velocity.
 
@@ -84,17 +73,6 @@ class ControlTable:
         found = [self[name] for name in names]
         first = min(one.address for one in found)
         return Register(first, max(one.end for one in found) - first)
-
-
-def signed(value: int, size: int) -> int:
-    """Return the unsigned `value` of `size` bytes as a two's complement number."""
-    half = 1 << (8 * size - 1)
-    return value - 2 * half if value >= half else value
-
-
-def unsigned(value: int, size: int) -> int:
-    """Return a signed `value` as the unsigned number of `size` bytes."""
-    return value & ((1 << (8 * size)) - 1)
 
 
 def folder() -> Path:

@@ -22,14 +22,14 @@ from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel import latency_timer, startup
 from uam_sim_bridge.devices.dynamixel.budget import Budget, budget
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, ServoDescription
-from uam_sim_bridge.devices.dynamixel.control_table import signed
 from uam_sim_bridge.devices.dynamixel.goals import Command, goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.health import CycleMeter, ServoHealth
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.port import PatientPort
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost, NoAnswer, Refused, ServoBus
 from uam_sim_bridge.devices.dynamixel.upkeep import Upkeep
+from uam_sim_bridge.devices.serial.serial_port import SerialPort
+from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, tried
 
 STATE = (names.PRESENT_POSITION, names.PRESENT_VELOCITY, names.PRESENT_CURRENT)
 START_ANSWER = 0.3  # [s] for each answer before the first cycle: the computer is busy then
@@ -63,7 +63,7 @@ class ArmDriver:
         control_period: float = 0.004,
         position_p_gain: float = 800.0,
         clock: Callable[[], float] = time.monotonic,
-        port: PatientPort | None = None,
+        port: SerialPort | None = None,
     ) -> None:
         """servo_mode: of the vehicle's `servos`; control_period [s]; position_p_gain: of position
         mode, register value; clock: seconds; port: see `ServoBus`. Raises ArmError."""
@@ -76,7 +76,7 @@ class ArmDriver:
             startup.check_turn(chain)
         self.latency_timer = latency_timer.latency_timer(chain.device)
         wait = parameters.answer_timeout + 2.0 * (self.latency_timer or 0.0) + chain.return_delay
-        self.bus = ServoBus(chain.device, chain.baud_rate, wait, port)
+        self.bus = DynamixelBus(chain.device, chain.baud_rate, wait, port)
         self._upkeep = Upkeep(
             self.bus, chain, parameters, position_p_gain if self.in_position_mode else None
         )
@@ -138,9 +138,9 @@ class ArmDriver:
         self.remarks += self._timing_remarks()
         counts = []
         for servo, health in zip(chain.servos, self.health, strict=True):
-            health.error = startup.tried(bus.read, servo.id, servo.table[names.HARDWARE_ERROR])
+            health.error = tried(bus.read, servo.id, servo.table[names.HARDWARE_ERROR])
             at = servo.table[names.PRESENT_POSITION]
-            counts.append(startup.tried(bus.read_signed, servo.id, at))
+            counts.append(tried(bus.read_signed, servo.id, at))
         self.start_angles = startup.angles(chain, counts)
         stowed = [servo.stowed for servo in chain.servos]
         self.remarks += startup.pose_findings(chain, counts, stowed, p.pose_tolerance)
@@ -201,7 +201,7 @@ class ArmDriver:
             problems = []
             for servo in self.chain.servos:
                 try:
-                    startup.tried(self.bus.write, servo.id, servo.table[names.TORQUE_ENABLE], 0)
+                    tried(self.bus.write, servo.id, servo.table[names.TORQUE_ENABLE], 0)
                 except (NoAnswer, Refused, BusLost) as error:
                     problems.append(f"{servo.label}: {error}")
                 self._upkeep.unprepared.add(servo.id)
@@ -287,13 +287,8 @@ class ArmDriver:
 
     def _decoded(self, servo: ServoDescription, data: bytes) -> list[int]:
         """Return the registers of STATE in the bytes of a common read."""
-        found = []
-        for name in STATE:
-            at = servo.table[name]
-            start = at.address - self._span.address
-            raw = int.from_bytes(data[start : start + at.size], "little")
-            found.append(signed(raw, at.size))
-        return found
+        parts = (servo.table[name].of(data, self._span.address) for name in STATE)
+        return [int.from_bytes(part, "little", signed=True) for part in parts]
 
     def _lose_device(self, error: BusLost) -> None:
         self.device_problem = str(error)

@@ -8,8 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_sim_bridge.devices.dynamixel.chain import ServoDescription
-from uam_sim_bridge.devices.dynamixel.friction import friction_torque
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
+
+
+def friction_torque(coulomb: float, viscous: float, velocity: float, speed: float) -> float:
+    """Return the friction torque [N m] at a desired velocity [rad/s].
+
+    coulomb [N m]; viscous [N m s/rad]; speed [rad/s]: width of the smooth sign, tanh(velocity /
+    speed), which has no step when the desired velocity changes its sign.
+    """
+    return coulomb * math.tanh(velocity / speed) + viscous * velocity
 
 
 @dataclass(frozen=True)

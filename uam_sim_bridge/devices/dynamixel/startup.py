@@ -7,37 +7,23 @@ two servos of one model swapped at equal angles: those are checked by hand (docs
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import permutations, product
-from typing import TypeVar
 
 from uam_control.vehicle import POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel.chain import SPEEDS, ArmChain, ArmError, ServoDescription
 from uam_sim_bridge.devices.dynamixel.control_table import MODE_NAMES, model_name
-from uam_sim_bridge.devices.dynamixel.servo_bus import NoAnswer, Refused, ServoBus
+from uam_sim_bridge.devices.servo_bus import NoAnswer, Refused, ServoBus, tried
 
-ATTEMPTS = 3  # pings and reads at the start: a single bit error is no missing servo
 FAST_FIRMWARE = 45  # first one with Fast Sync Read
 DRIVE_MODE_FORBIDDEN = {0: "reverse direction", 3: "torque on by a goal"}  # bits
 ALL_STATUS = 2  # Status Return Level
-
-T = TypeVar("T")
 
 
 def required_mode(servo_mode: str) -> int:
     """Return the Operating Mode for a mode of the vehicle's servos."""
     return names.POSITION_MODE if servo_mode == POSITION_SERVO else names.CURRENT_MODE
-
-
-def tried(call: Callable[..., T], *arguments: object) -> T:
-    """Return call(*arguments); repeat it when the answer is missing. Raises NoAnswer."""
-    for _ in range(ATTEMPTS - 1):
-        try:
-            return call(*arguments)
-        except NoAnswer:
-            continue
-    return call(*arguments)
 
 
 def check_servos(bus: ServoBus, chain: ArmChain) -> None:

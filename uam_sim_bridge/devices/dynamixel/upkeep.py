@@ -13,11 +13,9 @@ from itertools import cycle, product
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
 from uam_sim_bridge.devices.dynamixel.control_table import WATCHDOG_TRIPPED, WATCHDOG_UNIT
-from uam_sim_bridge.devices.dynamixel.hardware_errors import hardware_errors
-from uam_sim_bridge.devices.dynamixel.health import ServoHealth
+from uam_sim_bridge.devices.dynamixel.health import ServoHealth, hardware_errors
 from uam_sim_bridge.devices.dynamixel.parameters import HOLD, ArmDriverParameters
-from uam_sim_bridge.devices.dynamixel.servo_bus import BusLost, NoAnswer, Refused, ServoBus
-from uam_sim_bridge.devices.dynamixel.startup import tried
+from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, ServoBus, tried
 
 TORQUE, SUPPLY, WATCHDOG = "torque", "supply", "watchdog"
 # one of them of one servo per slow read
@@ -150,9 +148,7 @@ class Upkeep:
         except (NoAnswer, Refused):
             return
         values = {
-            name: int.from_bytes(
-                data[servo.table[name].address - span.address :][: servo.table[name].size], "little"
-            )
+            name: int.from_bytes(servo.table[name].of(data, span.address), "little")
             for name in SLOW_BLOCKS[block]
         }
         if block == SUPPLY:

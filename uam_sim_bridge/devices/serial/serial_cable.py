@@ -15,8 +15,8 @@ import numpy as np
 
 from uam_sim_bridge.devices.serial.bit_errors import disturbed
 from uam_sim_bridge.devices.serial.pseudo_terminal import DeviceThread, PseudoTerminal
+from uam_sim_bridge.devices.serial.serial_port import BITS_PER_BYTE
 
-BITS_PER_BYTE = 10  # start, eight data bits, stop
 IDLE = 0.02  # [s] longest wait
 HELD = 65536  # bytes under way in one direction; a UART's sender would wait
 

@@ -15,8 +15,8 @@ from uam_sim_bridge.devices.dynamixel.control_table import BAUD_RATES
 from uam_sim_bridge.devices.dynamixel.emulated.line import ServoLine
 from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
 from uam_sim_bridge.devices.serial.pseudo_terminal import DeviceThread, PseudoTerminal
+from uam_sim_bridge.devices.serial.serial_port import BITS_PER_BYTE
 
-BITS_PER_BYTE = 10  # start, 8 data, stop
 IDLE = 0.01  # [s] between two looks at the watchdogs of a silent bus
 _SPEEDS = {
     getattr(termios, f"B{rate}"): rate for rate in BAUD_RATES if hasattr(termios, f"B{rate}")

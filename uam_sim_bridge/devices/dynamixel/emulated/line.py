@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_sim_bridge.devices.dynamixel.emulated import packets
-from uam_sim_bridge.devices.dynamixel.emulated.packets import BROADCAST, Packet, PacketReader
+from uam_sim_bridge.devices.dynamixel import protocol
 from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
+from uam_sim_bridge.devices.dynamixel.protocol import BROADCAST, STATUS, Packet, PacketReader
 from uam_sim_bridge.devices.serial.bit_errors import disturbed
 
 PING_SLOT = 0.001  # [s] between answers to a broadcast ping
@@ -51,7 +51,7 @@ class ServoLine:
     def receive(self, data: bytes, speed: int | None) -> Iterator[tuple[float, bytes]]:
         """Take bytes at a baud rate, None: any; yield (delay [s], bytes) of each answer."""
         for packet in self._reader.feed(self._disturbed(data)):
-            if self._lost():
+            if packet.instruction == STATUS or self._lost():
                 continue
             listening = [
                 one for one in self.servos if one.connected and speed in (None, one.baud_rate)
@@ -92,14 +92,14 @@ class ServoLine:
     def _answers(self, packet: Packet, listening: list[EmulatedServo]) -> list[tuple[float, bytes]]:
         """Execute an instruction; return (delay [s], bytes) of each status packet."""
         p, code = packet.parameters, packet.instruction
-        if code in (packets.SYNC_READ, packets.FAST_SYNC_READ):
+        if code in (protocol.SYNC_READ, protocol.FAST_SYNC_READ):
             return self._sync_read(packet, listening)
-        if code == packets.SYNC_WRITE:
+        if code == protocol.SYNC_WRITE:
             self._sync_write(p, listening)
             return []
         chosen = [one for one in listening if packet.id in (BROADCAST, one.id)]
         made = [(one, self._single(one, code, p)) for one in chosen]
-        if packet.id == BROADCAST and code != packets.PING:
+        if packet.id == BROADCAST and code != protocol.PING:
             return []
         found = [(one, data) for one, data in made if data is not None]
         if packet.id == BROADCAST:
@@ -117,29 +117,29 @@ class ServoLine:
     def _single(servo: EmulatedServo, code: int, p: bytes) -> bytes | None:
         """Execute an instruction for one servo; return its status packet or None."""
         level, own = servo.get("Status Return Level"), servo.id
-        if code == packets.PING:
+        if code == protocol.PING:
             number, firmware = servo.get("Model Number"), servo.get("Firmware Version")
-            return packets.status(
+            return protocol.status(
                 own, servo.alert, number.to_bytes(2, "little") + bytes([firmware])
             )
-        if code == packets.READ:
+        if code == protocol.READ:
             if len(p) != 4:
-                return packets.status(own, packets.DATA_LENGTH | servo.alert)
+                return protocol.status(own, protocol.DATA_LENGTH | servo.alert)
             error, data = servo.read(_word(p), _word(p[2:]))
-            return packets.status(own, error, data) if level >= 1 else None
-        if code == packets.WRITE:
+            return protocol.status(own, error, data) if level >= 1 else None
+        if code == protocol.WRITE:
             error = servo.write(_word(p), p[2:])
-        elif code == packets.REG_WRITE:
+        elif code == protocol.REG_WRITE:
             error = servo.register(_word(p), p[2:])
-        elif code == packets.ACTION:
+        elif code == protocol.ACTION:
             servo.act()
             error = servo.alert
-        elif code == packets.REBOOT:
+        elif code == protocol.REBOOT:
             error = servo.alert
             servo.restart()
         else:
-            error = packets.BAD_INSTRUCTION | servo.alert
-        return packets.status(own, error) if level >= 2 else None
+            error = protocol.BAD_INSTRUCTION | servo.alert
+        return protocol.status(own, error) if level >= 2 else None
 
     @staticmethod
     def _sync_write(p: bytes, listening: list[EmulatedServo]) -> None:
@@ -161,12 +161,12 @@ class ServoLine:
             one = by_id[number]
             error, data = one.read(address, length)
             answers.append((one, error, data))
-        if packet.instruction == packets.SYNC_READ:
-            return [(one.return_delay, packets.status(one.id, e, d)) for one, e, d in answers]
+        if packet.instruction == protocol.SYNC_READ:
+            return [(one.return_delay, protocol.status(one.id, e, d)) for one, e, d in answers]
         if not answers:
             return []
         padded = [(one.id, e, d.ljust(length, b"\0")) for one, e, d in answers]
-        parts = packets.fast_status(padded, len(p) - 4)
+        parts = protocol.fast_status(padded, len(p) - 4)
         return [(answers[0][0].return_delay, parts[0]), *((0.0, part) for part in parts[1:])]
 
 

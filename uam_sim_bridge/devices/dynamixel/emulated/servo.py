@@ -10,18 +10,16 @@ import time
 from collections.abc import Callable
 
 from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel import protocol
 from uam_sim_bridge.devices.dynamixel.control_table import (
     FIRST_RAM,
     WATCHDOG_TRIPPED,
     WATCHDOG_UNIT,
-    Register,
     control_table,
-    signed,
-    unsigned,
 )
-from uam_sim_bridge.devices.dynamixel.emulated import packets
 from uam_sim_bridge.devices.dynamixel.emulated.shafts import Drive, Shaft
-from uam_sim_bridge.devices.dynamixel.hardware_errors import ERROR_BITS
+from uam_sim_bridge.devices.dynamixel.health import ERROR_BITS
+from uam_sim_bridge.devices.servo_bus import Register, word
 
 READ_ONLY = (
     *(names.MODEL_NUMBER, "Model Information", names.FIRMWARE, names.HARDWARE_ERROR),
@@ -46,7 +44,7 @@ LIMITED = {names.GOAL_CURRENT: names.CURRENT_LIMIT, "Goal PWM": "PWM Limit"}
 RANGES = {
     names.TORQUE_ENABLE: (0, 1),
     names.BAUD_RATE: (0, len(names.BAUD_RATES) - 1),
-    names.ID: (0, packets.LAST_ID),
+    names.ID: (0, protocol.LAST_ID),
     names.RETURN_DELAY: (0, 254),
     names.BUS_WATCHDOG: (0, 127),
     names.STATUS_LEVEL: (0, 2),
@@ -103,17 +101,16 @@ class EmulatedServo:
     @property
     def alert(self) -> int:
         """The error bit of every status packet while a hardware error is set."""
-        return packets.ALERT if self.get(names.HARDWARE_ERROR) else 0
+        return protocol.ALERT if self.get(names.HARDWARE_ERROR) else 0
 
-    def get(self, name: str) -> int:
-        """Return the unsigned value of a register."""
-        at = self.table[name]
-        return int.from_bytes(self._memory[at.address : at.end], "little")
+    def get(self, name: str, signed: bool = False) -> int:
+        """Return the value of a register."""
+        return int.from_bytes(self.table[name].of(self._memory, 0), "little", signed=signed)
 
     def set(self, name: str, value: int) -> None:
         """Set a register to a signed value, without regard to access rights."""
         at = self.table[name]
-        self._memory[at.address : at.end] = unsigned(value, at.size).to_bytes(at.size, "little")
+        self._memory[at.address : at.end] = word(value, at.size)
 
     def raise_error(self, error: str) -> None:
         """Set a hardware error, of ERROR_BITS; the shutdown register decides on the torque."""
@@ -144,14 +141,14 @@ class EmulatedServo:
     def read(self, address: int, length: int) -> tuple[int, bytes]:
         """Return (error, data) of a Read."""
         if length == 0 or address + length > len(self._memory):
-            return packets.ACCESS | self.alert, b""
+            return protocol.ACCESS | self.alert, b""
         self._sense()
         return self.alert, bytes(self._memory[address : address + length])
 
     def write(self, address: int, data: bytes) -> int:
         """Write, and return the error of the status packet; a refused write changes nothing."""
         if not data or address + len(data) > len(self._memory):
-            return packets.ACCESS | self.alert
+            return protocol.ACCESS | self.alert
         touched = self._touched(address, len(data))
         if error := self._refusal(address, data, touched):
             return error | self.alert
@@ -162,7 +159,7 @@ class EmulatedServo:
             self.set(names.GOAL_CURRENT, 0)
         if self.get(names.TORQUE_ENABLE) > torque_before:
             self._sense()
-            self.set(names.GOAL_POSITION, signed(self.get(names.PRESENT_POSITION), 4))
+            self.set(names.GOAL_POSITION, self.get(names.PRESENT_POSITION))
             limit = self.get(names.CURRENT_LIMIT)
             self.set(names.GOAL_CURRENT, 0 if self.get(names.OPERATING_MODE) == 0 else limit)
         if any(name in (*GOALS, names.TORQUE_ENABLE, names.BUS_WATCHDOG) for name in touched):
@@ -191,24 +188,24 @@ class EmulatedServo:
     def _refusal(self, address: int, data: bytes, touched: dict[str, Register]) -> int:
         """Return the error of a write, 0 if it is allowed."""
         if any(name in READ_ONLY for name in touched):
-            return packets.ACCESS
+            return protocol.ACCESS
         if self.get(names.TORQUE_ENABLE) and address < FIRST_RAM:
-            return packets.ACCESS
+            return protocol.ACCESS
         tripped = self.get(names.BUS_WATCHDOG) == WATCHDOG_TRIPPED
         for name, at in touched.items():
             if at.address < address or at.end > address + len(data):
-                return packets.DATA_LENGTH
-            start = at.address - address
-            value = int.from_bytes(data[start : start + at.size], "little")
+                return protocol.DATA_LENGTH
+            value = int.from_bytes(at.of(data, address), "little")
             if tripped and name in GOALS:
-                return packets.DATA_RANGE
+                return protocol.DATA_RANGE
             if name == names.TORQUE_ENABLE and value and self._shut_down:
-                return packets.RESULT_FAIL
+                return protocol.RESULT_FAIL
             low, high = RANGES.get(name, (0, math.inf))
             if not low <= value <= high or (name == names.OPERATING_MODE and value not in MODES):
-                return packets.DATA_RANGE
-            if name in LIMITED and abs(signed(value, at.size)) > self.get(LIMITED[name]):
-                return packets.DATA_LIMIT
+                return protocol.DATA_RANGE
+            size = abs(int.from_bytes(at.of(data, address), "little", signed=True))
+            if name in LIMITED and size > self.get(LIMITED[name]):
+                return protocol.DATA_LIMIT
         return 0
 
     def _sense(self) -> None:
@@ -228,12 +225,12 @@ class EmulatedServo:
 
     def _drive(self) -> None:
         """Hand the goals to the motor."""
-        counts = signed(self.get(names.GOAL_POSITION), 4) - self.table.counts_per_turn // 2
+        counts = self.get(names.GOAL_POSITION, signed=True) - self.table.counts_per_turn // 2
         self.shaft.drive(
             Drive(
                 on=bool(self.get(names.TORQUE_ENABLE)),
                 mode=self.get(names.OPERATING_MODE),
-                current=signed(self.get(names.GOAL_CURRENT), 2) * self._unit,
+                current=self.get(names.GOAL_CURRENT, signed=True) * self._unit,
                 position=counts * 2.0 * math.pi / self.table.counts_per_turn,
             )
         )

@@ -1,8 +1,8 @@
-"""Packets of Dynamixel Protocol 2.0 on the servos' side.
+"""Packets of Dynamixel Protocol 2.0, for the driver and for the emulated servos.
 
 Header FF FF FD 00, id, length (2 bytes), instruction, parameters, CRC-16. Source: ROBOTIS e-manual,
-Protocol 2.0. Written from the manual, apart from the maker's library, which is the other end in the
-tests.
+Protocol 2.0. The maker's library is the other end in the tests; why it is not used:
+docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def unstuff(body: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Packet:
-    """An instruction packet; parameters without stuffing."""
+    """An instruction, or a STATUS packet: error, then data; parameters without stuffing."""
 
     id: int
     instruction: int
@@ -93,7 +93,7 @@ def fast_status(answers: list[tuple[int, int, bytes]], expected: int) -> list[by
 
 
 class PacketReader:
-    """Finds instruction packets in a stream of bytes; damaged ones are counted and skipped."""
+    """Finds packets in a stream of bytes; damaged ones are counted and skipped."""
 
     def __init__(self) -> None:
         self._bytes = b""
@@ -104,8 +104,7 @@ class PacketReader:
         self._bytes += data
         found = []
         while (packet := self._next()) is not None:
-            if packet.instruction != STATUS:
-                found.append(packet)
+            found.append(packet)
         return found
 
     def _next(self) -> Packet | None:
@@ -115,15 +114,16 @@ class PacketReader:
                 self._bytes = self._bytes[-3:]
                 return None
             self._bytes = self._bytes[start:]
-            if len(self._bytes) < 7:
+            if len(self._bytes) < 8:
                 return None
             length = int.from_bytes(self._bytes[5:7], "little")
+            fast = self._bytes[4] == BROADCAST and self._bytes[7] == STATUS  # has no stuffing
             if not SHORTEST <= length <= LONGEST:
                 self._skip_header()
                 continue
             # a header cannot occur within a packet: FF FF FD would be followed by FD
             again = self._bytes.find(HEADER, 4, 5 + length)
-            if again > 0:
+            if again > 0 and not fast:
                 self.damaged += 1
                 self._bytes = self._bytes[again:]
                 continue
@@ -134,7 +134,7 @@ class PacketReader:
                 self._skip_header()
                 continue
             self._bytes = self._bytes[7 + length :]
-            body = unstuff(whole[7:])
+            body = whole[7:] if fast else unstuff(whole[7:])
             return Packet(whole[4], body[0], body[1:])
 
     def _skip_header(self) -> None:
