@@ -79,11 +79,12 @@ class GraspExecutive:
         before = self._step in (Step.IDLE, Step.APPROACH, Step.ALIGN)
         return self._windows[0] if before and self._windows else None
 
-    def due(self, time: float) -> bool:
-        """Return whether a window is near at scenario time [s]."""
+    @property
+    def due_from(self) -> float:
+        """The scenario time [s] from which on a window is near; inf without one."""
         if self._step is not Step.IDLE:  # a retreat may pass the begin
-            return True
-        return bool(self._windows) and time >= self._windows[0].descent - BEFORE
+            return -math.inf
+        return self._windows[0].descent - BEFORE if self._windows else math.inf
 
     def step(self, sight: Sight) -> Directive:
         """Return the directive after `sight`; call it while the scenario is flown.

@@ -70,7 +70,7 @@ class _Planned:
         self.scenario, self.ground = scenario.begun_at(start), float(start[Z])
         landing = self.scenario.landing
         self.trajectory = self.scenario.trajectory(start)
-        self.times = np.arange(0.0, landing.at + landing.duration, STEP)
+        self.times = np.arange(0.0, landing.end, STEP)
 
 
 @dataclass(frozen=True)

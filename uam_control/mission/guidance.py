@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from uam_control.coordinates import (
     Y,
     Z,
 )
-from uam_control.maths.compiled import prepared
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
+from uam_control.maths.memory import Number, put, record
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.course import NEXT, Course, Cue
 from uam_control.mission.mission_parameters import MissionParameters
@@ -31,12 +34,47 @@ from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.segments import Segment, WayBack
-from uam_control.mission.motion.trajectory import Trajectory, empty_motion
+from uam_control.mission.motion.trajectory import Trajectory, empty_motion, write_motions
 from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, GoalPose, Plan, Points
 from uam_control.mission.scenarios.route import SINK
 
 COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
+
+
+# following: number of the next of the motions ahead
+WHOLE, REAL = "following", "scenario_time gravity rate_max acceleration_max"
+MOST = 64  # motions ahead
+
+
+class GuidanceArrays(NamedTuple):
+    """reference, motion: of `Guidance`; motions (MOST, 5, 6 + n), times (MOST,) [s]: ahead, on the
+    path; drag (3,) [1/s]; numbers (1,): WHOLE, REAL."""
+
+    reference: np.ndarray
+    motion: np.ndarray
+    motions: np.ndarray
+    times: np.ndarray
+    drag: np.ndarray
+    numbers: np.ndarray
+
+
+@borrowing
+def publish(a: GuidanceArrays) -> None:
+    """Write the motion to the reference, with the attitude that it needs."""
+    m = a.numbers[0]
+    write_reference(a.motion, a.drag, m.gravity, m.rate_max, m.acceleration_max, a.reference)
+
+
+@borrowing
+def follow_path(a: GuidanceArrays) -> None:
+    """Write the next motion that `Guidance.look_ahead` has computed, and its reference."""
+    m = a.numbers[0]
+    m.scenario_time = a.times[m.following]
+    for row in range(len(a.motion)):
+        put(a.motions[m.following, row], a.motion[row])
+    m.following += 1
+    publish(a)
 
 
 def _unshifted(motion: np.ndarray) -> None:
@@ -49,8 +87,11 @@ class Guidance:
     `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
     (5, 6 + n): the same without attitude, with jerk and snap. `course`: what it does, by the table
     of `course`. `scenario_time` [s]: time on the scenario, constant during a hold; `end` [s]: stamp
-    at which a descent reaches the ground, inf without one.
+    at which a descent reaches the ground, inf without one. `arrays`: what compiled functions use,
+    never replaced.
     """
+
+    scenario_time = Number()
 
     def __init__(
         self,
@@ -65,13 +106,13 @@ class Guidance:
         end [s]: scenario time at which the path ends.
         """
         self._end = end
-        self.configure(parameters)
         self.reference = reference
-        self._write_reference = prepared(
-            write_reference, reference, self._drag, 0.0, 0.0, 0.0, reference
-        )
-        self.motion = empty_motion(reference.shape[1] - ALPHA)
-        self.scenario_time = 0.0
+        self.motion = motion = empty_motion(reference.shape[1] - ALPHA)
+        self.memory, self._drag = record(WHOLE, REAL), np.zeros(3)
+        ahead = np.zeros((MOST, *motion.shape)), np.zeros(MOST)
+        self.arrays = GuidanceArrays(reference, motion, *ahead, self._drag, self.memory)
+        self.configure(parameters)
+        self._publish = bound(publish, self.arrays)
         self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
         self._clock = PathClock(stamp)
         self._rates = STEADY  # derivatives of the scenario time
@@ -87,8 +128,10 @@ class Guidance:
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next manoeuvre on."""
-        self.parameters = parameters
-        self._drag = np.array(parameters.drag, dtype=float)
+        self.parameters, m = parameters, self.memory
+        self._drag[:] = parameters.drag
+        m["gravity"], m["rate_max"] = parameters.gravity, parameters.attitude_rate_max
+        m["acceleration_max"] = parameters.attitude_acceleration_max
 
     @property
     def end(self) -> float:
@@ -132,17 +175,31 @@ class Guidance:
         for plan in self._plans.values():
             plan.write(stamp, motion)
 
-    def _publish(self) -> None:
-        """Write the motion to the reference, with the attitude that it needs."""
-        p = self.parameters
-        self._write_reference(
-            self.motion,
-            self._drag,
-            p.gravity,
-            p.attitude_rate_max,
-            p.attitude_acceleration_max,
-            self.reference,
-        )
+    def on_path(self, stamp: float) -> bool:
+        """Return whether the reference follows the path at the pace of the stamps, from the newest
+        `advance` on, at `stamp` [s]."""
+        on_path = self.course is Course.PATH and not self.coming_back and self._arm is None
+        return on_path and self.goes_on and self._clock.settled <= stamp and self._rates == STEADY
+
+    def look_ahead(self, stamps: np.ndarray, until: float) -> int:
+        """Compute the path for `follow_path` at stamps (m,) [s], at most MOST.
+
+        Only `on_path`. Returns for how many the scenario's time is below `until` [s].
+        """
+        times = self._clock.settled_at(stamps)
+        count = int(np.searchsorted(times, until))
+        self.arrays.times[:count] = times[:count]
+        motions = self.arrays.motions[:count]
+        write_motions(self._trajectory, times[:count], motions)
+        for motion in motions:
+            self.shift(motion)
+        self.memory["following"] = 0
+        return count
+
+    @property
+    def followed(self) -> int:
+        """Number of the motions that `follow_path` has written since `look_ahead`."""
+        return self.memory["following"].item()
 
     def pace(self, stamp: float, rate: float) -> None:
         """Change the rate [1] of the scenario's clock: 1 on, 0 stop, -1 back along the path.

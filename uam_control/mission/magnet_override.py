@@ -9,6 +9,11 @@ class MagnetOverride:
     def __init__(self) -> None:
         self._given: tuple[bool, bool] | None = None  # overriding value, scenario's value then
 
+    @property
+    def given(self) -> bool:
+        """Whether there is one."""
+        return self._given is not None
+
     def give(self, on: bool, scenario: bool) -> None:
         """Override by `on`; scenario: its present value."""
         self._given = on, scenario

@@ -11,6 +11,8 @@ from uam_control.coordinates import ALPHA, CHI, POSITION, Z
 from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight, grasp_windows
 from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.place_history import PlaceHistory
+from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
@@ -48,11 +50,17 @@ class WithoutDescent:
 
 
 class PayloadWatch:
-    """The executive of a flight, stepped 50 times a second while the scenario is flown."""
+    """The executive of a flight, stepped 50 times a second while the scenario is flown.
+
+    `due_from` [s]: scenario time from which on it is stepped.
+    """
+
+    _stepped, due_from = Number(), Number()
 
     def __init__(
         self, scenario: Scenario, guidance: Guidance, parameters: MissionParameters
     ) -> None:
+        self.memory = record("", "stepped due_from")
         windows = grasp_windows(scenario.moves, scenario.magnet)
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
@@ -60,6 +68,7 @@ class PayloadWatch:
         self._shift = Shift()
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
+        self._due = prepared(due, self.memory, 0.0, 0.0)
         self._places = PlaceHistory()  # of the magnet
         self._planned: tuple[GraspWindow, np.ndarray] | None = None  # magnet at its descent
         self._left_out: GraspWindow | None = None
@@ -83,6 +92,11 @@ class PayloadWatch:
         self._shift.advance(stamp)
 
     @property
+    def settled(self) -> bool:
+        """Whether the path's shift is constant."""
+        return self._shift.settled
+
+    @property
     def grip(self) -> bool:
         """Whether the magnet is on before the scenario switches it on."""
         return self.executive.directive.grip
@@ -98,7 +112,8 @@ class PayloadWatch:
         state (3, 6 + n). Returns the reason to end the mission, "" without one.
         """
         executive, guidance = self.executive, self._guidance
-        if stamp - self._stepped < PERIOD - 1e-6 or not executive.due(guidance.scenario_time):
+        self.due_from = executive.due_from
+        if not self._due(self.memory, stamp, guidance.scenario_time):
             return ""
         if not all(map(math.isfinite, state[CHI].tolist())):  # faster than numpy on eight numbers
             return ""
@@ -168,3 +183,11 @@ class PayloadWatch:
                 way[:Z] = (p.clear_distance / distance - 1.0) * beside
                 way[Z] = p.clear_height
         return way
+
+
+@jit
+def due(watch: np.ndarray, stamp: float, time: float) -> bool:
+    """Return whether a `PayloadWatch` is due at `stamp` [s] and the scenario's `time` [s]; watch
+    (1,): its memory."""
+    m = watch[0]
+    return stamp - m.stepped >= PERIOD - 1e-6 and time >= m.due_from

@@ -35,6 +35,11 @@ class Shift:
         self._segment = Segment(stamp, self._values, goal, np.full(3, length))
 
     @property
+    def settled(self) -> bool:
+        """Return whether no change is under way."""
+        return self._segment is None
+
+    @property
     def value(self) -> np.ndarray:
         """Return the present shift (3,) [m]; read only."""
         return self._values[CHI]

@@ -17,6 +17,11 @@ class Steps(Generic[V]):
         self._find, self._times = value, tuple(times)
         self._begin = self._end = math.nan  # no time is between them
 
+    @property
+    def until(self) -> float:
+        """The time [s] until which the value of the newest look-up holds."""
+        return self._end
+
     def at(self, time: float) -> V:
         """Return the value at `time` [s]."""
         if not self._begin <= time < self._end:

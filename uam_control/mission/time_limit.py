@@ -17,7 +17,7 @@ def time_limit(scenario: Scenario, parameters: MissionParameters | None) -> floa
     parameters: of a flight to which nobody gives commands.
     """
     commanded = 0.0 if parameters is None else parameters.command_timeout
-    return scenario.landing.at + scenario.landing.duration + OVERTIME + commanded
+    return scenario.landing.end + OVERTIME + commanded
 
 
 class Settled:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DOT, Z
+from uam_control.maths.compiled import jit
 from uam_control.mission.mission_parameters import MissionParameters
 
 
@@ -29,11 +30,10 @@ class Touchdown:
         """Return whether the second half of a descent has begun."""
         return stamp >= self._half_down
 
-    @staticmethod
-    def on_ground(state: np.ndarray, ground: float, p: MissionParameters) -> bool:
-        """Return whether the vehicle is low and slow; state (3, 6 + n); ground [m]: its height."""
-        low = state.item(CHI, Z) < ground + p.touchdown_height
-        return low and abs(state.item(CHI_DOT, Z)) < p.touchdown_speed
+    @property
+    def idle(self) -> bool:
+        """Return whether no descent has begun, and the vehicle is not at rest on the ground."""
+        return math.isinf(self._half_down) and self._at_rest_since is None
 
     def at_rest(self, stamp: float, on_ground: bool, p: MissionParameters) -> bool:
         """Return whether the vehicle has been on the ground for touchdown_time."""
@@ -43,3 +43,12 @@ class Touchdown:
         if self._at_rest_since is None:
             self._at_rest_since = stamp
         return stamp - self._at_rest_since >= p.touchdown_time
+
+
+@jit
+def on_ground(state: np.ndarray, ground: float, height: float, speed: float) -> bool:
+    """Return whether the vehicle is low and slow.
+
+    state (3, 6 + n); ground [m]: its height; height [m], speed [m/s]: of `touchdown`.
+    """
+    return state[CHI, Z] < ground + height and abs(state[CHI_DOT, Z]) < speed

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import Number, record
 from uam_control.mission import Mission
+from uam_control.mission.guidance import MOST
+from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
 from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, Readings, State
+from uam_control.supervision.observation import ReadingArrays
+
+
+class StageArrays(NamedTuple):
+    """Of the mission; numbers (1,): memory of a `MissionStage`."""
+
+    mission: MissionArrays
+    numbers: np.ndarray
 
 
 class MissionStage:
@@ -23,20 +36,28 @@ class MissionStage:
     `MissionOutput`, `flying` is whether the controllers fly its reference, `reference`
     (3, 6 + n) what they fly, see `ahead`, and `time` the mission time [s]. `ahead` [ns]: the stamp
     of the newest reference.
+
+    While the mission only follows its scenario, compiled functions do the same: `begin_tick` and
+    `advance` of this module, on `arrays`.
     """
+
+    time, ahead, period = Number(), Number(), Number()
+    _last, _flown = Number(), Number()
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
         self.mission, self.output = mission, mission.output
+        # [ns]: last: the tick before; flown: newest reference that the mission has flown
+        self.memory = record("ahead last period flown", "time")
         self.period = timing.period
         self.inputs = SupervisorInputs(self.period / SECOND)
         self.flying = False
         self.reference, self.time = self.output.reference, self.output.time
-        self.ahead = self._last = -1  # [ns]; _last: the tick before
+        self.ahead = self._last = -1
         self._armed_since: float | None = None
         self._reports: deque[tuple[int, bool, int | None, tuple[float, ...], Authority]] = deque()
         self._authority = Authority()
         self._readings = Readings()
-        self._flown = -REPORT_DELAY  # [ns] newest reference that the mission has flown
+        self._flown = -REPORT_DELAY
 
     def autopilot(
         self,
@@ -108,3 +129,52 @@ class MissionStage:
         # ground. If they arrived before the status, they would switch off the motors at low height.
         failing = output.state is State.FAILSAFE and ahead - self._flown < REPORT_DELAY
         self.flying = output.flying or failing
+
+    def nominal(self, stamp: int) -> bool:
+        """Return whether the ticks after `stamp` [ns], the newest one with a state, may be compiled
+        until a value or a message demands a decision."""
+        following = stamp + self.period
+        if self.ahead != following or self._last != stamp:
+            return False
+        self.take_reports(following)
+        held = self._authority.released_to or self._authority.failed
+        known = self.flying and self._armed_since is not None and not (self._reports or held)
+        return known and self.mission.nominal
+
+    def look_ahead(self, most: int) -> int:
+        """Make ready for at most `most` compiled ticks; return for how many."""
+        count = min(most, MOST)
+        return self.mission.look_ahead(
+            (self.ahead + self.period * np.arange(1, count + 1)) / SECOND
+        )
+
+    @property
+    def arrays(self) -> StageArrays:
+        """What the compiled ticks of a flight use."""
+        return StageArrays(self.mission.arrays, self.memory)
+
+    def resume(self, state: np.ndarray) -> None:
+        """Go on after compiled ticks, the last one with state (3, 6 + n)."""
+        self.mission.resume(state, self._authority)
+
+
+@borrowing
+def begin_tick(a: StageArrays, stamp: int) -> None:
+    """Do what `MissionStage.begin` does at the tick `stamp` [ns] that `advance` has made ready."""
+    m, mission = a.numbers[0], a.mission.numbers[0]
+    m.last, m.time = stamp, mission.stamp - mission.takeoff
+
+
+@borrowing
+def advance(a: StageArrays, readings: ReadingArrays, stamp: int, state: np.ndarray) -> bool:
+    """Do what `MissionStage.advance` does at `stamp` [ns].
+
+    Returns False, and changes nothing, where something is to be decided.
+    """
+    m = a.numbers[0]
+    ahead = stamp + m.period
+    if not follow_scenario(a.mission, readings, ahead / SECOND, state):
+        return False
+    m.ahead = ahead
+    m.flown = ahead
+    return True

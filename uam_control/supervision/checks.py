@@ -14,9 +14,10 @@ import numpy as np
 from uam_control.ages import FORWARDED, usable
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
-from uam_control.supervision.observation import NUMBERS, Observation
+from uam_control.supervision.observation import NUMBERS, Observation, ReadingArrays, Readings
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
@@ -121,7 +122,7 @@ _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
 _SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
 _CHECKED = len(CHECKS)
 _READ = tuple(NUMBERS.index(CHECKS[i].reading) for i in _ROWS)  # places of their readings
-_MOCAP_AGE = NUMBERS.index("mocap_age")
+_MOCAP_AGE, _ROUND_TRIP, _LOOP_DELAY = map(NUMBERS.index, ("mocap_age", "round_trip", "loop_delay"))
 
 
 class ExceededLimit(NamedTuple):
@@ -140,26 +141,38 @@ class ExceededLimit(NamedTuple):
         return self.name in BLIND
 
 
+class CheckArrays(NamedTuple):
+    """bounds: all limits in one array. Of every quantity the lowest limit, below which no monitor
+    changes while all are quiet; low and high corner (3,) of the box [m]; gains (3,) of position,
+    attitude, arm; `joints` angles [rad]; torques [N m]. values: of CHECKS; numbers (1,): joints,
+    setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the parameters."""
+
+    bounds: np.ndarray
+    values: np.ndarray
+    numbers: np.ndarray
+
+
 class Checks:
     """The monitors of all quantities.
 
     `setpoint_delay` [s]: of the last tick, NaN if unknown; `finding`: the worst exceeded limit,
-    None without one; `quiet`: no value is beyond a limit, not even for a short time.
+    None without one; `quiet`: no value is beyond a limit, not even for a short time. `arrays`: what
+    compiled functions use; `configure` replaces them.
     """
+
+    setpoint_delay = Number()
 
     def __init__(self, parameters: SupervisionParameters) -> None:
         self._monitors = [Monitor() for _ in CHECKS]
         self.quiet = True
         self._values = np.zeros(len(CHECKS))
         self.finding: ExceededLimit | None = None
+        self.memory = record("joints", "setpoint_delay delay_nominal share")
         self.setpoint_delay = math.nan
         self._stands = math.inf
         self.configure(parameters)
-        rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), np.zeros(len(NUMBERS))
-        self._measure = prepared(
-            *(measure_all, rows, rows, three, 0.0, readings, three, three, 0.0, 0.0),
-            *(self._bounds, 0, self._values),
-        )
+        rows, readings = np.zeros((3, ALPHA)), Readings().arrays
+        self._measure = prepared(measure_all, self.arrays, rows, rows, 0.0, readings, True)
 
     def configure(self, parameters: SupervisionParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
@@ -174,9 +187,11 @@ class Checks:
         )
         first = [min(limits) for limits in self._limits]
         parts = first, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
-        self._bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
-        self._bounds = self._bounds.astype(float)
-        self._joints = len(p.joint_angle_hold)
+        bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
+        self.arrays = CheckArrays(bounds.astype(float), self._values, self.memory)
+        self.memory["joints"] = len(p.joint_angle_hold)
+        self.memory["delay_nominal"] = p.delay_nominal
+        self.memory["share"] = p.delay_share_of_round_trip
 
     def follow(self, stands: float) -> None:
         """Use a reference that stands a delay of the setpoints of `stands` [s], inf: any."""
@@ -193,27 +208,13 @@ class Checks:
 
         in_flight: whether the vehicle follows the reference.
         """
-        readings, p = seen.readings, self._parameters
-        link = by_link(readings, p, in_flight)
-        loop = by_loop(readings, p) if in_flight else math.nan
-        self.setpoint_delay = larger(link, loop)
+        readings = seen.readings.arrays
         calm = self._measure(
-            seen.state,
-            seen.reference,
-            readings.mocap_position,
-            seen.ground,
-            readings.values,
-            readings.joint_effort,
-            readings.gains,
-            link,
-            loop,
-            self._bounds,
-            self._joints,
-            self._values,
+            self.arrays, seen.state, seen.reference, seen.ground, readings, in_flight
         )
         if calm and self.quiet:
             return None
-        worst = None
+        p, worst = self._parameters, None
         for check, monitor, value, limits, after in zip(
             CHECKS, self._monitors, self._values.tolist(), self._limits, self._after, strict=True
         ):
@@ -245,32 +246,31 @@ def _cause(check: Check, value: float, limit: float) -> str:
 
 @jit
 def measure_all(
+    a: CheckArrays,
     state: np.ndarray,
     reference: np.ndarray,
-    mocap: np.ndarray,
     ground: float,
-    readings: np.ndarray,
-    efforts: np.ndarray,
-    gains: np.ndarray,
-    link: float,
-    loop: float,
-    bounds: np.ndarray,
-    joints: int,
-    values: np.ndarray,
+    readings: ReadingArrays,
+    in_flight: bool,
 ) -> bool:
-    """Write all quantities into values, in the order of CHECKS; return whether all are calm.
+    """Write all quantities into the values, in the order of CHECKS; return whether all are calm.
 
-    state to ground: see `measure`; readings to gains: see `read`; link, loop: setpoint delays [s],
-    NaN if unknown. bounds: all limits in one array. Of every quantity the lowest limit, below which
-    no monitor changes while all are quiet; low and high corner (3,) of the box [m];
-    gains (3,) of position, attitude, arm; `joints` angles [rad]; torques [N m].
+    state, reference (3, 6 + n); ground [m]: height at take-off; in_flight: whether the vehicle
+    follows the reference.
     """
+    m, bounds, values = a.numbers[0], a.bounds, a.values
     box, gain = _CHECKED, _CHECKED + 6
     angle = gain + 3
-    effort = angle + joints
-    corners, age = bounds[box:gain].reshape((2, 3)), readings[_MOCAP_AGE]
-    measure(state, reference, mocap, age, ground, corners, bounds[angle:effort], values)
-    read(readings, efforts, gains, bounds[effort:], bounds[gain:angle], values)
+    effort = angle + m.joints
+    known = readings.values
+    corners, age = bounds[box:gain].reshape((2, 3)), known[_MOCAP_AGE]
+    measure(
+        *(state, reference, readings.position, age, ground, corners, bounds[angle:effort], values)
+    )
+    read(known, readings.effort, readings.gains, bounds[effort:], bounds[gain:angle], values)
+    link = by_link(known[_ROUND_TRIP], m.share, in_flight)
+    loop = by_loop(known[_LOOP_DELAY], m.delay_nominal, in_flight)
+    m.setpoint_delay = larger(link, loop)
     values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
     values[LATE_FOR_REFERENCE] = max(values[LATE], values[LATE_LOOP])
     return _below(values, bounds[:box])

@@ -30,6 +30,11 @@ class Holds:
         self._event = Event.HOLD
         self._resumes: Counter[str] = Counter()  # quantity → holds that ended in CLEAR
 
+    @property
+    def lasts(self) -> bool:
+        """Whether there is a hold now."""
+        return self._since < math.inf
+
     def begin(self, stamp: float, event: Event, quantity: str) -> None:
         """Begin a hold at `stamp` [s]; quantity: name of the quantity beyond its limit, or ""."""
         self._since, self._event, self._quantity = stamp, event, quantity
@@ -55,7 +60,7 @@ class Holds:
 
         level, beyond: of the worst exceeded limit now, and its cause; cause: of the hold.
         """
-        if self._since == math.inf:
+        if not self.lasts:
             return
         if level is Level.FINE:
             self._beyond_since = None
@@ -74,7 +79,7 @@ class Holds:
 
         off_path: a goal or trajectory was flown; then the hold waits for a command.
         """
-        if not self._quantity or self._since == math.inf:
+        if not self._quantity or not self.lasts:
             return
         if self._quantity == CONTROLLERS:
             back = "the controller is back"

@@ -13,7 +13,7 @@ from uam_control.ages import STALE
 from uam_control.estimation.repeats import Repeats, repeated
 from uam_control.maths.compiled import borrowing, jit, prepared
 from uam_control.maths.memory import Known, Number, put, record
-from uam_control.supervision.observation import Readings
+from uam_control.supervision.observation import ReadingArrays, Readings
 from uam_control.supervision.pace import Pace
 
 POSE = ("position", "attitude")  # controllers without which the vehicle does not follow its path
@@ -32,14 +32,12 @@ REAL = (
 
 
 class InputArrays(NamedTuple):
-    """State of `Inputs`. readings (1,), position, payload (3,), effort (n,), gains (3,): of
-    `Readings`; bias_mean (3,) [m/s^2]; newest (7,): of `Repeats`; numbers (1,): see REAL."""
+    """State of `Inputs`. readings (1,), known, payload (3,): of `Readings`; bias_mean (3,) [m/s^2];
+    newest (7,): of `Repeats`; numbers (1,): see REAL."""
 
     readings: np.ndarray
-    position: np.ndarray
+    known: ReadingArrays
     payload: np.ndarray
-    effort: np.ndarray
-    gains: np.ndarray
     bias_mean: np.ndarray
     newest: np.ndarray
     numbers: np.ndarray
@@ -73,8 +71,8 @@ class Inputs:
 
     def _make_arrays(self, bias_mean: np.ndarray, newest: np.ndarray) -> None:
         r = self._readings
-        known = r.mocap_position, r.payload_position, r.joint_effort, r.gains
-        self.arrays = InputArrays(r.memory, *known, bias_mean, newest, self.memory)
+        known = r.memory, r.arrays, r.payload_position
+        self.arrays = InputArrays(*known, bias_mean, newest, self.memory)
 
     @property
     def settled(self) -> bool:
@@ -168,7 +166,7 @@ def take_pose(a: InputArrays, stamp: float, position: np.ndarray, quaternion: np
     """
     m = a.numbers[0]
     m.mocap = stamp
-    put(position, a.position)
+    put(position, a.known.position)
     if not repeated(position, quaternion, a.newest):
         m.moved = stamp
 
@@ -195,7 +193,7 @@ def take_gains(
     """Store the adapted gains (n,) of a controller, by its number in SUBSYSTEMS, at `stamp` [s];
     watched: see `Inputs.watched`."""
     m = a.numbers[0]
-    a.gains[number] = largest_of(values, watched)
+    a.known.gains[number] = largest_of(values, watched)
     if number == 0:
         m.position = stamp
     elif number == 1:

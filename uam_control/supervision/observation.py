@@ -49,6 +49,15 @@ NUMBERS = (
 )  # of the readings
 
 
+class ReadingArrays(NamedTuple):
+    """values: all NUMBERS; position (3,), effort (n,), gains (3,): see `Readings`."""
+
+    values: np.ndarray
+    position: np.ndarray
+    effort: np.ndarray
+    gains: np.ndarray
+
+
 class Readings:
     """Readings besides state and reference; NaN means unknown and has no effect.
 
@@ -81,6 +90,11 @@ class Readings:
         self.mocap_position, self.payload_position = np.full((2, 3), math.nan)
         for name, value in known.items():
             setattr(self, name, value)
+
+    @property
+    def arrays(self) -> ReadingArrays:
+        """What compiled functions use."""
+        return ReadingArrays(self.values, self.mocap_position, self.joint_effort, self.gains)
 
 
 @dataclass

@@ -13,23 +13,28 @@ from __future__ import annotations
 
 import math
 
-from uam_control.supervision.observation import Readings
+from uam_control.maths.compiled import jit
 from uam_control.supervision.supervision_parameters import SupervisionLimits
 
 SYMMETRIC = 0.5  # share of the round trip that is on the way to the autopilot, if both are alike
 
 
-def by_link(readings: Readings, limits: SupervisionLimits, in_flight: bool) -> float:
-    """Return the delay [s] that the round trip shows, NaN if unknown."""
-    return (SYMMETRIC if in_flight else limits.delay_share_of_round_trip) * readings.round_trip
+@jit
+def by_link(round_trip: float, share: float, in_flight: bool) -> float:
+    """Return the delay [s] that the round trip [s] shows, NaN if unknown; share: on the ground."""
+    return (SYMMETRIC if in_flight else share) * round_trip
 
 
-def by_loop(readings: Readings, limits: SupervisionLimits) -> float:
-    """Return the delay [s] that the loop delay shows, NaN if unknown; it counts in flight."""
-    late = readings.loop_delay - limits.delay_nominal
+@jit
+def by_loop(loop_delay: float, nominal: float, in_flight: bool) -> float:
+    """Return the delay [s] that the loop delay [s] shows, NaN if unknown; it counts in flight."""
+    if not in_flight:
+        return math.nan
+    late = loop_delay - nominal
     return 0.0 if late < 0.0 else late
 
 
+@jit
 def larger(link: float, loop: float) -> float:
     """Return the larger of two delays [s]; NaN only if both are unknown."""
     return loop if math.isnan(link) or loop > link else link

@@ -15,7 +15,11 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
+import numpy as np
+
 from uam_control.coordinates import CHI, Z
+from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.memory import Number, record
 from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.checks import (
     CONTRADICTION,
@@ -78,16 +82,18 @@ class Supervisor:
     `state`, `cause`, `decision`: after the last step; `changes`: all transitions so far, in order.
     """
 
+    _stamp = Number()
+
     def __init__(self, parameters: SupervisionParameters) -> None:
+        # left_behind: stamp [s] from which the reference climbs without the vehicle
+        self.memory = record("", "stamp left_behind airborne_height liftoff_timeout")
         self.state = State.GROUNDED
         self.cause = "waiting for the start"
         self.changes: list[StateTransition] = []
         self._arm = False
         self._regains = 0  # commands to regain a released vehicle
         self._regained = -math.inf  # stamp [s] of the newest one that still counts
-        self._left_behind = (
-            math.inf
-        )  # stamp [s] from which the reference climbs without the vehicle
+        self.memory["left_behind"] = math.inf
         self._was_armed = False  # the autopilot, at the last step before the take-off
         self._lands = False  # whether the autopilot lands a released vehicle
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
@@ -98,13 +104,18 @@ class Supervisor:
         self._stamp = -math.inf
         self._holds = Holds()
         self._checks = Checks(parameters)
-        self._parameters = parameters
-        self.decision = self._decide()
+        self._stays_behind = prepared(stays_behind, self.memory, 0.0, 0.0)
+        self._use(parameters)
 
     def configure(self, parameters: SupervisionParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
-        self._parameters = parameters
         self._checks.configure(parameters)
+        self._use(parameters)
+
+    def _use(self, parameters: SupervisionParameters) -> None:
+        self._parameters = parameters
+        self.memory["airborne_height"] = parameters.airborne_height
+        self.memory["liftoff_timeout"] = parameters.liftoff_timeout
         self.decision = self._decide()
 
     def step(
@@ -132,6 +143,11 @@ class Supervisor:
         flying = self.state is State.FLYING and seen.armed and not seen.authority.failed
         due = seen.landing_due or seen.arrived or seen.end_mission
         return flying and not due and not seen.authority.released_to
+
+    @property
+    def calm(self) -> bool:
+        """Whether no value is beyond a limit, not even for a short time, and no hold lasts."""
+        return self._checks.quiet and self._checks.finding is None and not self._holds.lasts
 
     @property
     def checks(self) -> Checks:
@@ -289,22 +305,16 @@ class Supervisor:
             yield _planned(Event.LANDING_DUE)
         if seen.arrived:
             yield _planned(Event.ARRIVED)
+        planned = seen.reference[CHI, Z] - seen.ground
         if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
-        elif self.state is State.TAKING_OFF and self._stays_behind(seen):
+        elif self.state is State.TAKING_OFF and self._stays_behind(
+            self.memory, self._stamp, planned
+        ):
             cause = NOT_FOLLOWED if seen.authority.lands else TOO_HEAVY
             if seen.on_ground:
                 yield Event.NO_LIFTOFF, cause
             yield Event.LAND_LIMIT, cause
-
-    def _stays_behind(self, seen: Observation) -> bool:
-        """Whether the reference has been airborne for liftoff_timeout, without the vehicle."""
-        p = self._parameters
-        if seen.reference[CHI, Z] - seen.ground <= p.airborne_height:
-            self._left_behind = math.inf
-            return False
-        self._left_behind = min(self._left_behind, self._stamp)
-        return self._stamp - self._left_behind >= p.liftoff_timeout
 
     def _go(self, event: Event, cause: str) -> None:
         source, self.state = self.state, TARGETS[self.state, event]
@@ -371,6 +381,21 @@ class Supervisor:
         event = command.value
         disarm = command is OperatorCommand.DISARM and seen.on_ground
         return event if (self.state, event) in TARGETS or not disarm else Event.DISARM_ON_GROUND
+
+
+@jit
+def stays_behind(supervisor: np.ndarray, stamp: float, planned: float) -> bool:
+    """Return whether the reference, `planned` [m] above the ground, has been airborne for
+    liftoff_timeout at `stamp` [s], without the vehicle.
+
+    supervisor (1,): memory of a `Supervisor` that takes off.
+    """
+    m = supervisor[0]
+    if planned <= m.airborne_height:
+        m.left_behind = math.inf
+        return False
+    m.left_behind = min(m.left_behind, stamp)
+    return stamp - m.left_behind >= m.liftoff_timeout
 
 
 def _in_control(released_to: str) -> str:

@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     console = Terminal()
     for layout in layouts:
         console.print(f"layout {layout}")
-        with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+        with Progress(console, landing.end) as progress, Interrupts() as stop:
             flight = replace(settings, out=out / layout, fused=layout == flown.FUSED)
             try:
                 budgets.append(flown.fly(layout, flight, progress, stop))

@@ -215,7 +215,7 @@ def fly(
     """
     landing = settings.scenario.landing
     console = Terminal()
-    with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+    with Progress(console, landing.end) as progress, Interrupts() as stop:
         flight = Flight.of(settings, progress, stop, engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()

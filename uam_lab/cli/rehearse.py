@@ -124,7 +124,7 @@ def run(options: argparse.Namespace) -> int:
     )
     console = Terminal()
     landing = settings.scenario.landing
-    with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+    with Progress(console, landing.end) as progress, Interrupts() as stop:
         folder, outcome, metrics = fly(lab, settings, rehearsal, progress, stop)
     result = FlightResult(folder, metrics, outcome)
     further = device_figures.lines(device_figures.saved(folder))

@@ -36,7 +36,7 @@ class ReferencePath:
     def __init__(self, scenario: Scenario, start: np.ndarray):
         """start: chi (6 + n,) at take-off, SI units."""
         landing = scenario.begun_at(start).landing
-        self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
+        self._times = np.arange(0.0, landing.end + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
         self._sampled = 0  # points so far
         self._trajectory, self._joints = scenario.trajectory(start), len(start) - ALPHA

@@ -32,7 +32,7 @@ def check(vehicle: VehicleDescription, scenario: Scenario, plant: str = DEFAULT_
         return
     start = standing(scenario.arm_start)
     flown = scenario.begun_at(start)
-    end = flown.landing.at + flown.landing.duration
+    end = flown.landing.end
     last = reference_rows(flown.trajectory(start), np.array([end]), len(vehicle.joints))
     told = ScenarioError, f"scenario {scenario.name}:"
     for (error, where), what, angles in (

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
 from uam_control.coordinates import CHI_DDOT, CHI_DOT, JERK, SNAP
 
+Stamps = TypeVar("Stamps", float, np.ndarray)
 STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a time that passes as the stamps do
 
 
@@ -43,14 +45,20 @@ class PathClock:
     def at(self, stamp: float) -> tuple[float, float, float, float, float]:
         """Return scenario time [s] and its first to fourth derivative [1, 1/s, 1/s^2, 1/s^3]."""
         if self._ramp is None:
-            return stamp - self._begin, 1.0, 0.0, 0.0, 0.0
-        begin, length, time, _, _, goal = self._ramp
+            return self.settled_at(stamp), 1.0, 0.0, 0.0, 0.0
+        begin, length, time, *_ = self._ramp
         elapsed = stamp - begin
         if elapsed >= length:  # for most of a flight: only the time changes
-            gained, one, two, three, four = self._end
-            return time + (goal * (elapsed - length) + gained), one, two, three, four
+            return self.settled_at(stamp), *self._end[1:]
         gained, one, two, three, four = self._on_ramp(max(elapsed / length, 0.0))
         return time + gained, one, two, three, four
+
+    def settled_at(self, stamp: Stamps) -> Stamps:
+        """Return scenario times [s] of stamps [s] from `settled` on."""
+        if self._ramp is None:
+            return stamp - self._begin
+        begin, length, time, _, _, goal = self._ramp
+        return time + (goal * (stamp - begin - length) + self._end[0])
 
     def _on_ramp(self, u: float) -> tuple[float, float, float, float, float]:
         """Return the scenario time [s] since the begin of the ramp, and its derivatives.

@@ -159,6 +159,14 @@ def reference_rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np
     if isinstance(trajectory, Tabulated):
         return trajectory.rows(times, CHI_DDOT + 1)
     found = np.empty((len(times), *empty_motion(joints).shape))
-    for time, motion in zip(times.tolist(), found, strict=True):
-        trajectory.write(time, motion)
+    write_motions(trajectory, times, found)
     return found.swapaxes(0, 1)[: CHI_DDOT + 1]
+
+
+def write_motions(trajectory: Trajectory, times: np.ndarray, motions: np.ndarray) -> None:
+    """Write the motions (m, 5, 6 + n) of a trajectory at times (m,) [s]."""
+    if isinstance(trajectory, Moves):
+        trajectory.write_rows(times, motions)
+        return
+    for time, motion in zip(times.tolist(), motions, strict=True):
+        trajectory.write(time, motion)

@@ -37,6 +37,16 @@ class Landing:
     at: float
     duration: float
 
+    @property
+    def half(self) -> float:
+        """Mission time [s] from which on a touchdown is one."""
+        return self.at + 0.5 * self.duration
+
+    @property
+    def end(self) -> float:
+        """Mission time [s]."""
+        return self.at + self.duration
+
 
 @dataclass(frozen=True)
 class Scenario:

@@ -59,7 +59,7 @@ def load_scenario(
     if read is None:
         raise ScenarioError(f"{file}: a name that ends in {', '.join(FORMS)} expected")
     scenario = read(file, vehicle, options).slowed(options.slowdown)
-    check_length(scenario.landing.at + scenario.landing.duration, f"{file}: the flight")
+    check_length(scenario.landing.end, f"{file}: the flight")
     return scenario
 
 
@@ -238,7 +238,7 @@ def _moves(top: Section, vehicle: VehicleDescription, landing: Landing) -> tuple
     last: dict[str, Move] = {}
     for i, move in enumerate(moves):
         base = move.coordinate in BASE_COORDINATES
-        latest = landing.at if base else landing.at + landing.duration
+        latest = landing.at if base else landing.end
         if move.end > latest:
             what = "landing begins" if base else "landing ends"
             raise top.error(f"moves[{i}].until", f"{move.end:g} s, but the {what} at {latest:g} s")

@@ -200,7 +200,7 @@ def measure(trial: Trial) -> TrialResult:
         seed=trial.seed,
         rms=_row(figures["rms"]),
         largest=_row(figures["max"]),
-        flown=min(1.0, figures["duration_s"] / (landing.at + landing.duration)),
+        flown=min(1.0, figures["duration_s"] / (landing.end)),
         cut_short=not bool(series.in_phase("landed").any()),
         outcome=end,
         why=explained(end, figures),

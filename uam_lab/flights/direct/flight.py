@@ -90,7 +90,7 @@ class DirectFlight:
         self._limit = time_limit(scenario, sets["mission"])
         self._complete = False  # every kind of sensor has delivered
         laws, columns = self.control.laws, columns_of(described)
-        length = scenario.landing.at + scenario.landing.duration + 12.0
+        length = scenario.landing.end + 12.0
         self.recording = FlightTable(int(length / self.plant.period), columns)
         controllers = {name: laws[name].controller for name in SUBSYSTEMS}
         self.recorder = TickRecorder(

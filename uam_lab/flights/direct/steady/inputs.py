@@ -152,7 +152,7 @@ def read_messages(a: InputArrays, stamp: int) -> None:
             take_pose(inputs, exposed, a.mocap[:3], a.mocap[3:])
     if kept[JOINTS]:
         m.joints = at[JOINTS] / SECOND
-        put(a.effort, inputs.effort)
+        put(a.effort, inputs.known.effort)
     if kept[PAYLOAD]:
         m.payload = at[PAYLOAD] / SECOND
         put(a.payload, inputs.payload)

@@ -11,7 +11,8 @@ import numpy as np
 from uam_control.estimation.estimator import write_biases
 from uam_control.maths.compiled import borrowing, inlined, jit
 from uam_control.maths.memory import put
-from uam_control.stages import estimator_stage
+from uam_control.mission.nominal_tick import watch_due
+from uam_control.stages import estimator_stage, mission_stage
 from uam_control.stages.estimator_stage import STATE, take_readings, take_sample
 from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
@@ -38,7 +39,6 @@ from uam_lab.flights.direct.steady.places import (
     REFERENCE,
     WATCH,
 )
-from uam_lab.flights.direct.steady.reference import ReferenceArrays, advance, watch_due
 from uam_sim_bridge.plant.plant_tick import PlantArrays, sense, step
 from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE
 
@@ -56,7 +56,7 @@ class TickArrays(NamedTuple):
     inputs: InputArrays
     laws: LawArrays
     bridge: BridgeArrays
-    reference: ReferenceArrays
+    mission: mission_stage.StageArrays
     state: np.ndarray
     flown: np.ndarray
     bias: np.ndarray
@@ -68,9 +68,9 @@ class TickArrays(NamedTuple):
     magnet: np.ndarray
 
 
-# entries of `counts`: row of the recording, ticks of its ring (first, next), stamp [ns] of state
-# and of the mission's begin (0: none), address of an error's text
-ROW, FIRST, NEXT, STAMP, BEGUN, FAULT = range(6)
+# entries of `counts`: row of the recording, ticks of its ring (first, next), stamp [ns] of the
+# state, address of an error's text
+ROW, FIRST, NEXT, STAMP, FAULT = range(5)
 
 
 @cache
@@ -159,10 +159,9 @@ def begin_tick(a: TickArrays) -> int:
         write_biases(a.estimation.estimator.pose.memory, a.bias)
         i.kept[BIAS], i.at[BIAS] = True, stamp / SECOND
         put(a.bias[1], i.bias)
-    c[BEGUN] = stamp
-    a.reference.memory[0].begun = a.reference.memory[0].time
+    mission_stage.begin_tick(a.mission, stamp)
     for row in range(len(a.flown)):
-        put(a.reference.reference[row], a.flown[row])
+        put(a.mission.mission.guidance.reference[row], a.flown[row])
     return LAWS
 
 
@@ -176,9 +175,9 @@ def decide(a: TickArrays) -> int:
         *(a.bridge, stamp, time, a.state, tau_p, tau_q, laws.position.attitude, a.inputs),
     ):
         return BRIDGE
-    if not advance(a.reference, a.inputs, stamp, a.state):
+    if not mission_stage.advance(a.mission, a.inputs.inputs.known, stamp, a.state):
         return REFERENCE
-    return WATCH if watch_due(a.reference) else RECORD
+    return WATCH if watch_due(a.mission.mission) else RECORD
 
 
 @inlined
@@ -191,7 +190,7 @@ def end_tick(a: TickArrays) -> int:
     stamp = c[STAMP] / SECOND - m.period / 2.0
     c[FIRST] = record(
         *(a.table, c[ROW], a.ring, c[FIRST], c[NEXT], time, a.motors, magnet, stamp),
-        *(a.reference.memory[0].begun, a.state, a.flown, position.attitude),
+        *(a.mission.numbers[0].time, a.state, a.flown, position.attitude),
         *(position.all.tau, attitude.all.tau, arm.all.tau, bridge.rates, bridge.sent[1]),
         *(bridge.bridge[0].factor, a.layout),
     )

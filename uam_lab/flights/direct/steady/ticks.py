@@ -25,7 +25,6 @@ from uam_lab.flights.direct.steady.inputs import KeptMessages
 from uam_lab.flights.direct.steady.laws import law_arrays
 from uam_lab.flights.direct.steady.loop import FAULT, ROW, STAMP, TickArrays, run
 from uam_lab.flights.direct.steady.places import END, ERROR, LISTEN, RECORD, WATCH
-from uam_lab.flights.direct.steady.reference import ReferencePart
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.plant import PhysicsError, Plant, Samples
@@ -79,9 +78,9 @@ class SteadyTicks:
             self.able = False
             return
         self._inputs = KeptMessages(stages.mission.inputs, self._controllers, plant.joints)
-        self._reference = ReferencePart(stages.mission)
+        self._mission = stages.mission
         self._sent = np.zeros(2)
-        self._counts, self._biases = np.zeros(6, dtype=np.int64), np.zeros((2, 3))
+        self._counts, self._biases = np.zeros(5, dtype=np.int64), np.zeros((2, 3))
         self._magnet = np.zeros(1, dtype=np.bool_)
         self._made: tuple = ()
         self._reported = -1  # [ns] tick of the newest report
@@ -112,13 +111,12 @@ class SteadyTicks:
 
     def _fly(self, count: int, begin: int, enough: int, most: int) -> tuple[int, int]:
         """Fly after `_load`; return how many ticks ended, and where: see `places`."""
-        loop, reference, flown = self._present(), self._reference, 0
-        state = self._flight.control.signals.state
+        loop, mission, flown = self._present(), self._mission.mission, 0
         while True:
-            done, end = loop(count - reference.advanced, begin)
+            done, end = loop(count - mission.looked_ahead, begin)
             flown += done
             if end == WATCH:
-                if not reference.watch(state):
+                if not mission.watch():
                     break
                 begin = RECORD
             elif end == END and flown < enough:
@@ -141,7 +139,7 @@ class SteadyTicks:
             stages.measured_delay.report(stamp, report.loop_delay)
         most = min(most, len(self._flight.recorder.table.values) - self._counts.item(ROW))
         most = min(most, self._flight.plant.draw_noise(), self._ticks_to_report(stamp))
-        return self._reference.renew(self._flight.control.signals.state, most)
+        return self._mission.look_ahead(most)
 
     def _report(self) -> AutopilotReport | None:
         """Make the report that the last compiled tick of the bridge has, if it is not made."""
@@ -154,7 +152,7 @@ class SteadyTicks:
     def _ticks_to_report(self, stamp: int) -> int:
         """Return how many ticks after `stamp` [ns] the next report is due."""
         left = self._flight.control.bridge.reports.next - stamp
-        return max(1, -(-left // self._reference.period))
+        return max(1, -(-left // self._mission.period))
 
     def _load(self, most: int, begin: int) -> int:
         """Copy the state into the arrays; return how many ticks may begin, -1: not steady.
@@ -164,14 +162,14 @@ class SteadyTicks:
         flight = self._flight
         stages, recorder, self._sent[0] = flight.control, flight.recorder, 0.0
         signals, table, half = stages.signals, recorder.table, begin == RECORD
-        output, reference = stages.mission.output, self._reference
+        output = stages.mission.output
         told = output.arm, output.magnet, False, output.regains
         steady = (
             signals.flying
             and signals.phase == output.phase
             and signals.magnet == output.magnet
             and stages._told == told
-            and reference.steady(signals.stamp)
+            and stages.mission.nominal(signals.stamp)
             and stages.bridge.settled
             and flight.autopilot.settled
             and not stages.estimator.held_back
@@ -183,8 +181,8 @@ class SteadyTicks:
         most = min(most, len(table.values) - table.count, left) - half
         most = min(most, self._ticks_to_report(signals.stamp))
         ring = recorder._first, recorder._next
-        self._counts[:] = table.count, *ring, signals.stamp, 0, 0
-        return reference.load(signals.stamp, most) if most >= 0 else -1
+        self._counts[:] = table.count, *ring, signals.stamp, 0
+        return stages.mission.look_ahead(most) if most >= 0 else -1
 
     def _present(self) -> Callable[[int, int], tuple[int, int]]:
         """Return the loop with the arrays of all parts; made anew if objects have changed."""
@@ -194,7 +192,7 @@ class SteadyTicks:
             *(one.arrays for one in self._controllers),
             stages.mission.inputs.inputs.arrays,
             *(stages.bridge.map.curve, flight.autopilot.autopilot.arrays),
-            *(stages.mission.mission._guidance, stages.mission.mission._parameters),
+            stages.mission.mission.arrays,
         )
         same = len(made) == len(self._made) and all(map(is_, made, self._made))
         if not same:
@@ -206,7 +204,7 @@ class SteadyTicks:
                 self._inputs.arrays(),
                 law_arrays(stages),
                 bridge_arrays(stages.bridge, flight.autopilot, self._sent),
-                self._reference.arrays(),
+                stages.mission.arrays,
                 stages.signals.state,
                 stages.signals.reference,
                 self._biases,
@@ -229,10 +227,10 @@ class SteadyTicks:
         """Copy the state back after a loop that ended in `end`."""
         flight, stages = self._flight, self._flight.control
         signals, plant, recorder = stages.signals, flight.plant, flight.recorder
-        row, first, following, stamp, begun, _ = self._counts.tolist()
+        row, first, following, stamp, _ = self._counts.tolist()
         observed = end != END
         self._inputs.store()
-        self._reference.store(signals.state)
+        stages.mission.resume(signals.state)
         bridge = stages.bridge
         bridge.report = self._report()
         if self._sent[0]:
@@ -246,8 +244,7 @@ class SteadyTicks:
         signals.stamp = stamp
         if bridge.report is not None:
             take_report(stages, bridge.report)
-        if begun:
-            signals.time = self._reference.begun(begun)
+        signals.time = stages.mission.time
         signals.thrust_factor, signals.setpoint = bridge.factor, bridge.kept
         if observed:
             found = flight.delivered(plant.arrived())
