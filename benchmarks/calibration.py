@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.experiments.campaign.trial import Trial, fly
+from uam_lab.experiments.trials.trial import Trial, fly
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant.effects import presets
 

@@ -29,8 +29,8 @@ import psutil
 from distributed import LocalCluster
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.experiments.campaign.trial import measure
 from uam_lab.experiments.campaign.variations import Draws, ranges
+from uam_lab.experiments.trials.trial import measure
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
 from uam_lab.flights.direct.warm_up import prepare_direct
@@ -43,7 +43,7 @@ POLL = 0.5  # [s]
 def overhead(options) -> int:
     """Print the time of a flight in a loop, that by a worker, and their ratio."""
     draws = Draws(load_profile("s500"), options.flights, 1, ranges(), options.scenario)
-    trials = [one.trial for one in draws]
+    trials = list(draws)
     prepare_direct()
     begun = time.perf_counter()
     with workers(Workplace(1), prepare_direct) as crew:

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from table1_flights import flights, picture, table
 
-from uam_lab.experiments.campaign.flying import fly_all
-from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.trials.experiment import flown_by
+from uam_lab.experiments.trials.trial import Trial
 from uam_lab.experiments.workers.place import Workplace, cores
 
 PAYLOAD = 0.2  # [kg], the paper's
@@ -45,10 +45,10 @@ def fly(rows, options) -> list[table.Flown]:
         for seed in seeds
     ]
 
-    def show(done, result):
+    results = [None] * len(trials)
+    for done, (number, result) in enumerate(flown_by(Workplace(options.jobs), trials), 1):
+        results[number] = result
         print(f"\r{done} of {len(trials)} flights", end="", flush=True)
-
-    results = fly_all(trials, Workplace(options.jobs), progress=show)
     print()
     grouped = [results[i * len(seeds) : (i + 1) * len(seeds)] for i in range(len(rows))]
     return [

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from loading.conditions import Condition, under
-from uam_lab.experiments.campaign.fault_outcome import classify
+from uam_lab.experiments.trials.outcome import classify
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.result_folder import in_a_name, new_folder
 from uam_sim_bridge.ports import INSTANCES, ports_of

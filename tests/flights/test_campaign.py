@@ -27,19 +27,17 @@ def draws(total, seed):
 
 def test_a_draw_repeats_and_a_longer_one_begins_alike():
     few, many = draws(3, 5), draws(6, 5)
-    assert [d.values for d in few] == [many[k].values for k in range(3)]
-    assert [d.trial.vehicle_changes for d in few] == [
-        many[k].trial.vehicle_changes for k in range(3)
-    ]
-    assert draws(1, 6)[0].values != few[0].values
-    assert all(tuple(d.values) == many.names for d in many)
+    assert [d.drawn for d in few] == [many[k].drawn for k in range(3)]
+    assert [d.vehicle_changes for d in few] == [many[k].vehicle_changes for k in range(3)]
+    assert draws(1, 6)[0].drawn != few[0].drawn
+    assert all(tuple(d.drawn) == many.names for d in many)
     for name, (low, high) in ranges().items():
-        assert all(low <= d.values[name] <= high for d in many), name
+        assert all(low <= d.drawn[name] <= high for d in many), name
 
 
 def test_single_draws_are_chosen_by_number():
     five = draws(5, 1)
-    assert five.chosen("4,0,4") == [0, 4] and five[4].trial.seed == 100_004
+    assert five.chosen("4,0,4") == [0, 4] and five[4].seed == 100_004
     assert list(five.chosen("")) == [0, 1, 2, 3, 4]
     for wrong in ("5", "-1", "1;2", "1,"):
         with pytest.raises(VariationError, match="numbers of 0 to 4"):
@@ -48,7 +46,7 @@ def test_single_draws_are_chosen_by_number():
 
 def test_what_failures_have_in_common_is_found():
     forty = list(draws(40, 1))
-    values = {name: np.array([d.values[name] for d in forty]) for name in ("wind", "mass")}
+    values = {name: np.array([d.drawn[name] for d in forty]) for name in ("wind", "mass")}
     name, lost, kept, distance = common(values, values["wind"] > 4.0)[0]
     assert name == "wind" and lost > 4.0 > kept and distance > 1.0
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign import trial
 from uam_lab.experiments.compare import plan
+from uam_lab.experiments.trials import trial
 
 
 def compare(out, *options):

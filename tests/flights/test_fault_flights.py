@@ -17,7 +17,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.supervision import Event, State
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign.fault_outcome import classify, ending
+from uam_lab.experiments.trials.outcome import classify, ending
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results import metrics
 from uam_lab.records.results.outcome import transitions

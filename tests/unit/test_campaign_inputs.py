@@ -9,7 +9,7 @@ import pytest
 
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
-from uam_lab.experiments.campaign.inputs import inputs
+from uam_lab.experiments.trials.inputs import inputs
 
 
 @pytest.fixture

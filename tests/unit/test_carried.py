@@ -9,8 +9,8 @@ import pytest
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.experiments.campaign.carried import arrived, carried
-from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.trials.carried import arrived, carried
+from uam_lab.experiments.trials.trial import Trial
 from uam_sim_bridge.plant import Vehicle
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
-from uam_lab.experiments.campaign.trial import Trial, TrialResult
 from uam_lab.experiments.compare import comparison_report, modularity, plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
 from uam_lab.experiments.compare.plan import ASMC1, ASMC2, FROZEN, PROPOSED
+from uam_lab.experiments.trials.trial import Trial, TrialResult
 
 
 def flight(label, seed, rms, mass=0.2, outcome="completed"):

@@ -7,9 +7,7 @@ import pytest
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign.trial import Trial
-from uam_lab.experiments.study import kept
-from uam_lab.experiments.study.flights import StudyFlight
+from uam_lab.experiments.study.flights import StudyFlight, mark
 from uam_lab.records.results import row_table
 from uam_lab.records.results.row_table import RowTableError
 
@@ -62,14 +60,14 @@ def test_rows_are_of_other_flights_after_an_edit_of_the_scenario(
 
 def test_a_study_knows_an_edited_scenario_and_another_vehicle_of_the_same_name(scenario):
     profile = load_profile("s500")
-    trial = Trial("row", profile, 0.0, 1, str(scenario))
-    before = kept.mark(StudyFlight("row", "nominal", trial))
-    assert kept.mark(StudyFlight("row", "nominal", trial)) == before
+    trial = StudyFlight("row", profile, 0.0, 1, str(scenario), condition="nominal")
+    before = mark(trial)
+    assert mark(replace(trial)) == before
     heavier = replace(profile.vehicle, numbers=profile.vehicle.numbers | {"ground": 1.0})
     edited = replace(trial, profile=replace(profile, vehicle=heavier))
-    assert kept.mark(StudyFlight("row", "nominal", edited)) != before
+    assert mark(edited) != before
     edit(scenario)
-    assert kept.mark(StudyFlight("row", "nominal", trial)) != before
+    assert mark(trial) != before
 
 
 @pytest.mark.parametrize("option", FOREIGN)

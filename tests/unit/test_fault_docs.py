@@ -8,7 +8,7 @@ from pathlib import Path
 
 from uam_control.mission import load_scenario
 from uam_lab.cli.parser import parser
-from uam_lab.experiments.campaign.fault_outcome import OUTCOMES
+from uam_lab.experiments.trials.outcome import OUTCOMES
 from uam_sim_bridge.faults import FAULTS, fault_catalogue, read_schedule
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/faults.md").read_text()

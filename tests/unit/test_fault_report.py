@@ -11,9 +11,10 @@ from default_columns import COLUMNS
 
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign import fault_matrix, fault_report
-from uam_lab.experiments.campaign.fault_outcome import OUTCOMES, classify, down_after, explained
-from uam_lab.experiments.campaign.fault_trial import FaultResult
+from uam_lab.experiments.faults import matrix as fault_matrix
+from uam_lab.experiments.faults import report as fault_report
+from uam_lab.experiments.faults.trial import FaultResult
+from uam_lab.experiments.trials.outcome import OUTCOMES, classify, down_after, explained
 from uam_lab.records.results import metrics
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import draw
@@ -222,10 +223,10 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
     ("promise", "message"),
     [
         ("landed", "{outcome: ..., within: seconds, because: text} expected"),
-        ("{outcome: [[held]]}", "unknown outcome '['held']'; there are: refused, completed"),
-        ("{outcome: fine}", "unknown outcome 'fine'; there are: refused, completed"),
-        ("{outcome: held, because: 3}", "because: 3 is not a text"),
-        ("{outcome: held, within: soon}", "within: 'soon' is not a time"),
+        ("{outcome: [[held]]}", "outcome: unknown '['held']'; there are: refused, completed"),
+        ("{outcome: fine}", "outcome: unknown 'fine'; there are: refused, completed"),
+        ("{outcome: held, because: 3}", "because: a name expected, got 3"),
+        ("{outcome: held, within: soon}", "within: a number expected, got 'soon'"),
         ("{outcome: held, by: 3}", "by: unknown; allowed: outcome, within"),
     ],
 )

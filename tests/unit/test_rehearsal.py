@@ -293,8 +293,8 @@ def test_a_hot_servo_stops_at_its_limit(laboratory):
 
 
 def test_a_file_of_the_matrix_has_thirty_flights():
-    from uam_lab.experiments.campaign import fault_matrix
-    from uam_lab.experiments.campaign.fault_outcome import REFUSED
+    from uam_lab.experiments.faults import matrix as fault_matrix
+    from uam_lab.experiments.trials.outcome import REFUSED
 
     matrix = fault_matrix.read(Path("config/campaign/cables.yaml"), "rehearsal")
     cells = matrix.cells(1)[1:]

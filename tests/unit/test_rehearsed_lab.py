@@ -11,10 +11,10 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign import rehearsed_trial
-from uam_lab.experiments.campaign.fault_matrix import Cell
-from uam_lab.experiments.campaign.fault_outcome import LOST, REFUSED, Promise
-from uam_lab.experiments.campaign.rehearsed_trial import judged, with_checklist
+from uam_lab.experiments.faults import rehearsed
+from uam_lab.experiments.faults.matrix import Cell, Promise
+from uam_lab.experiments.faults.rehearsed import judged, with_checklist
+from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.flights.rehearsal.options import RehearsalOptions
@@ -260,7 +260,7 @@ def test_ctrl_c_ends_a_matrix_of_rehearsals_and_the_same_command_continues(
             stop.repeat()
         return tmp_path, Outcome(series=None, failure=REFUSAL + "no answer"), None
 
-    monkeypatch.setattr(rehearsed_trial, "fly", fly)
+    monkeypatch.setattr(rehearsed, "fly", fly)
     out = tmp_path / "out"
     command = ["faults", "--engine", "rehearsal", "--matrix", str(matrix), "--out", str(out)]
     assert main(command) == INTERRUPTED and len(flown) == 2

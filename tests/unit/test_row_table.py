@@ -14,9 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.coordinates import coordinates
-from uam_lab.experiments.campaign import fault_rows, trial_rows
-from uam_lab.experiments.campaign.fault_trial import FaultResult
-from uam_lab.experiments.campaign.trial import TrialResult
+from uam_lab.experiments.faults.trial import ROWS, FaultResult
+from uam_lab.experiments.trials.trial import TrialResult, result_rows
 from uam_lab.records.results.row_table import RowTable, RowTableError
 
 SCHEMA = pa.schema([("flight", pa.int64()), ("error", pa.float64()), ("why", pa.string())])
@@ -108,19 +107,20 @@ def test_a_killed_process_leaves_whole_parts(tmp_path):
 def trial_result(seed):
     rms = np.linspace(0.1, np.pi, 8)
     rms[3] = np.nan
-    figures = (0.5, True, "lost", "fell", None, (0.1, 0.2), {"K0": 1.0})
+    figures = (0.5, True, "lost", "fell", None, (0.1, 0.2), {"K0": 1.0}, {"wind": 1.5})
     return TrialResult("random", 0.1, seed, rms, 2 * rms, *figures)
 
 
 def test_a_trial_is_read_back_as_it_was(tmp_path):
     given = trial_result(3)
     file = tmp_path / "flights.parquet"
-    with RowTable(file, trial_rows.schema(2, ["wind"]), {"seed": "x"}) as rows:
-        rows.add(trial_rows.to_row(7, given, {"wind": 1.5}))
-    (stored,) = rows.compact().to_pylist()
+    rows = result_rows(2, ["wind"])
+    with RowTable(file, rows.schema, {"seed": "x"}) as table:
+        table.add(rows.to_row(7, given))
+    (stored,) = table.compact().to_pylist()
     assert stored["flight"] == 7 and stored["drawn.wind"] == 1.5
     assert [n for n in stored if n.startswith("rms.")] == [f"rms.{n}" for n in coordinates(2)]
-    read = trial_rows.from_row(stored)
+    read = rows.from_row(stored)
     for name, value in vars(given).items():
         np.testing.assert_array_equal(getattr(read, name), value, name)
 
@@ -128,7 +128,7 @@ def test_a_trial_is_read_back_as_it_was(tmp_path):
 def test_a_flight_of_a_fault_matrix_is_read_back_as_it_was(tmp_path):
     happened = ({"fault": "motor_loss", "begin_s": 3.5},)
     given = FaultResult("a", "b", "held", "", 4.5, {"arm_deg": [1.0, None]}, happened, None, True)
-    with RowTable(tmp_path / "flights.parquet", fault_rows.SCHEMA, {"seed": "x"}) as rows:
-        rows.add(fault_rows.to_row(0, given))
+    with RowTable(tmp_path / "flights.parquet", ROWS.schema, {"seed": "x"}) as rows:
+        rows.add(ROWS.to_row(0, given))
     (stored,) = rows.compact().to_pylist()
-    assert fault_rows.from_row(stored) == given
+    assert ROWS.from_row(stored) == given

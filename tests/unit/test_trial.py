@@ -3,6 +3,7 @@
 import argparse
 import math
 import re
+from dataclasses import fields
 
 import pytest
 import yaml
@@ -12,11 +13,11 @@ from hypothesis import strategies as st
 
 from uam_control.profiles.profile import load_profile
 from uam_lab.cli.command import seed
-from uam_lab.experiments.campaign import trial
-from uam_lab.experiments.campaign.trial import Trial, TrialFailed
 from uam_lab.experiments.campaign.variations import Draws, VariationError, ranges
 from uam_lab.experiments.study import flights
 from uam_lab.experiments.study.flights import StudyFlight
+from uam_lab.experiments.trials import trial
+from uam_lab.experiments.trials.trial import Trial, TrialFailed
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.flight_settings import LAST_SEED, SettingsError, settings
 from uam_lab.records.results.outcome import Outcome
@@ -27,7 +28,10 @@ PROFILE, RANGES = load_profile("s500"), ranges()
 
 def measures(flown):
     """What a campaign and a study do with a trial."""
-    return (lambda: trial.measure(flown)), (lambda: flights.measure(StudyFlight("r", "c", flown)))
+    of_study = StudyFlight(
+        **{one.name: getattr(flown, one.name) for one in fields(flown)}, condition="c"
+    )
+    return (lambda: trial.measure(flown)), (lambda: flights.measure(of_study))
 
 
 def test_a_flight_that_ends_before_its_first_row_is_refused_in_one_line(monkeypatch):
@@ -92,4 +96,4 @@ def test_every_seed_of_a_campaign_fits_or_it_is_refused(chosen, total):
         most = int(str(refusal).split(" to ")[1].split()[0])
         assert chosen > most
         drawn = Draws(PROFILE, total, most, RANGES)
-    assert drawn[total - 1].trial.seed <= LAST_SEED
+    assert drawn[total - 1].seed <= LAST_SEED

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
-from uam_lab.experiments.campaign.trial import TrialResult
+from uam_lab.experiments.trials.trial import TrialResult
 from uam_lab.experiments.tuning import convergence, front, search_results
 from uam_lab.experiments.tuning.search import Task, evaluated_start, open_study
 from uam_lab.experiments.tuning.space import Cost, TuningError, load_space

@@ -9,7 +9,8 @@ import yaml
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration, yaml_file
 from uam_control.vehicle import load_description
-from uam_lab.experiments.campaign import fault_matrix, variations
+from uam_lab.experiments.campaign import variations
+from uam_lab.experiments.faults import matrix as fault_matrix
 from uam_lab.experiments.study.description import load_study
 from uam_lab.experiments.tuning.space import load_space
 from uam_lab.flights.vehicle.lab_file import load_lab

@@ -10,8 +10,7 @@ from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
-from uam_lab.cli.counting import Counting
-from uam_lab.experiments.campaign.trial import Trial, TrialResult
+from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -76,43 +75,27 @@ def run(options: argparse.Namespace) -> int:
     if options.replay:
         if len(numbers) != 1 or not options.draws:
             raise SettingsError("--replay needs one flight: --draws I")
-        return _replay(draws[numbers[0]].trial, numbers[0], options.out)
+        return _replay(draws[numbers[0]], numbers[0], options.out)
 
-    from uam_lab.experiments.campaign import campaign_report, trial_rows
-    from uam_lab.experiments.campaign.flying import fly_into
-    from uam_lab.experiments.campaign.inputs import inputs
-    from uam_lab.records.results.row_table import RowTable
+    from uam_lab.experiments.campaign import report
+    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.inputs import inputs
 
     out = make_folder(options.out, "campaign")
     given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}
     given["profile"] = (profile.sets, profile.bridge())
-    flown = RowTable(
-        out / TABLE,
-        trial_rows.schema(len(vehicle.joints), draws.names),
-        inputs(vehicle, options.scenario, given),
-    )
-    before = sum(number in flown.keys for number in numbers)
-    if before:
-        say(f"campaign: continuing after {before} earlier flights")
-    with Counting("campaign", len(numbers)) as counting:
-        bad = 0
+    rows = result_rows(len(vehicle.joints), draws.names)
+    of = inputs(vehicle, options.scenario, given)
+    bad = 0
 
-        def show(done: int, result: TrialResult) -> None:
-            nonlocal bad
-            bad += not result.completed
-            counting.show(before + done, f"{bad} not completed")
+    def describe(result: TrialResult) -> str:
+        nonlocal bad
+        bad += not result.completed
+        return f"{bad} not completed"
 
-        fly_into(
-            flown,
-            ((number, draws[number].trial) for number in numbers if number not in flown.keys),
-            place,
-            lambda number, result: trial_rows.to_row(number, result, draws[number].values),
-            progress=show,
-        )
-    table = flown.compact()
-    if len(numbers) < table.num_rows:  # the folder has more flights than this command asks for
-        table = table.filter([number in numbers for number in table[trial_rows.NUMBER].to_pylist()])
-    say(campaign_report.write(out, table, vehicle.name, command_line(), _again(options)))
+    campaign = Experiment("campaign", out / TABLE, rows, of, place)
+    results = campaign.fly(numbers, draws.__getitem__, describe)
+    say(report.write(out, results, vehicle.name, command_line(), _again(options)))
     say(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
 

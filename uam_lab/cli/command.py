@@ -16,9 +16,9 @@ from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
-from uam_lab.experiments.campaign.trial import TrialFailed
 from uam_lab.experiments.campaign.variations import VariationError
 from uam_lab.experiments.study.description import StudyError
+from uam_lab.experiments.trials.trial import TrialFailed
 from uam_lab.experiments.tuning.space import TuningError
 from uam_lab.experiments.workers.place import WorkersError, Workplace, cores
 from uam_lab.flights.flight_settings import LAST_SEED, SettingsError

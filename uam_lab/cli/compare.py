@@ -20,9 +20,8 @@ from uam_lab.cli.command import (
     place_of,
     refuse_given,
 )
-from uam_lab.cli.counting import Counting
-from uam_lab.experiments.campaign.trial import TrialResult
 from uam_lab.experiments.compare import plan
+from uam_lab.experiments.trials.trial import TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import ENGINES, require_ros
 from uam_lab.records.results.result_folder import make_folder
@@ -92,6 +91,10 @@ def _further(text: str, vehicle: VehicleDescription) -> plan.ComparedController:
     return plan.ComparedController(label, profile)
 
 
+def _about(result: TrialResult) -> str:
+    return f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}"
+
+
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
     if options.study:
@@ -113,11 +116,9 @@ def run(options: argparse.Namespace) -> int:
         design=options.design,
         tune=options.tune,
     )
-    from uam_lab.experiments.campaign import trial_rows
-    from uam_lab.experiments.campaign.flying import fly_missing
-    from uam_lab.experiments.campaign.inputs import inputs
     from uam_lab.experiments.compare import comparison_report, modularity
-    from uam_lab.records.results.row_table import RowTable
+    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.inputs import inputs
 
     if options.engine == "ros":
         require_ros()
@@ -138,24 +139,18 @@ def run(options: argparse.Namespace) -> int:
     proposed = default_profile(catalogue.DEFAULT, vehicle)
     kept = out / "flights" / "modularity.parquet"
     # direct engine: these flights compare the laws only, which are the same in both engines
-    every = dict(enumerate([*trials, *modularity.trials(proposed, flights, kept)]))
+    every = [*trials, *modularity.trials(proposed, flights, kept)]
     profiles = [(row.label, row.profile.sets, row.profile.bridge()) for row in rows]
-    flown = RowTable(
+    of = {"profiles": profiles, "flights": (payloads, seeds, options.engine, effects)}
+    comparison = Experiment(
+        "compare",
         out / "flights.parquet",
-        trial_rows.schema(len(vehicle.joints)),
-        inputs(
-            vehicle,
-            scenario,
-            {"profiles": profiles, "flights": (payloads, seeds, options.engine, effects)},
-        ),
+        result_rows(len(vehicle.joints)),
+        inputs(vehicle, scenario, of),
+        place,
     )
-    with Counting("compare", len(every)) as counting:
-
-        def show(done: int, result: TrialResult) -> None:
-            counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
-
-        found = fly_missing(flown, every, place, trial_rows.to_row, progress=show)
-    results = [trial_rows.from_row(row) for row in found.values()]
+    found = comparison.fly(range(len(every)), every.__getitem__, _about)
+    results = list(found.values())
     results, others = results[: len(trials)], results[len(trials) :]
     modular = modularity.ModularityEvidence.of(proposed, kept, others)
     facts = {

@@ -19,8 +19,6 @@ from uam_lab.cli.command import (
     place_of,
     refuse_given,
 )
-from uam_lab.cli.counting import Counting
-from uam_lab.experiments.campaign.trial import Trial
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
@@ -32,8 +30,8 @@ from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
 
 if TYPE_CHECKING:
-    from uam_lab.experiments.campaign.fault_matrix import Cell, Matrix
-    from uam_lab.experiments.campaign.fault_trial import FaultResult
+    from uam_lab.experiments.faults.matrix import Cell, Matrix
+    from uam_lab.experiments.faults.trial import FaultResult
 
 BROKEN = 1
 EXAMPLES = """\
@@ -91,10 +89,11 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         say(fault_catalogue.listing())
         return 0
-    from uam_lab.experiments.campaign import fault_matrix, fault_report, fault_rows
-    from uam_lab.experiments.campaign.flying import fly_missing
-    from uam_lab.experiments.campaign.inputs import inputs
-    from uam_lab.records.results.row_table import RowTable
+    from uam_lab.experiments.faults import matrix as fault_matrix
+    from uam_lab.experiments.faults import report
+    from uam_lab.experiments.faults.trial import ROWS
+    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.inputs import inputs
 
     place = place_of(options)
     check_clock(options.engine, options.clock)
@@ -121,29 +120,29 @@ def run(options: argparse.Namespace) -> int:
     prepared = _rehearsals if rehearsed else _flights
     kind, make, measure, further = prepared(options, matrix, vehicle)
     out = make_folder(options.out, kind)
-    told = replace(matrix, draws=bool(matrix.draws))  # more draws are a longer table
+    known = replace(matrix, draws=bool(matrix.draws))  # more draws are a longer table
     settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
-    flown = RowTable(
+    of = settings | {"matrix": known, "profile and effects": further}
+    experiment = Experiment(
+        kind,
         out / "flights.parquet",
-        fault_rows.SCHEMA,
-        inputs(
-            vehicle, matrix.scenario, settings | {"matrix": told, "profile and effects": further}
-        ),
+        ROWS,
+        inputs(vehicle, matrix.scenario, of),
+        place,
+        measure,
     )
-    trials = dict(enumerate(make(cell, out) for cell in cells))
-    with Counting(kind, len(trials)) as counting:
-
-        def show(done: int, one: FaultResult) -> None:
-            moment = f", {one.moment}" if one.moment else ""
-            counting.show(done, f"{one.fault}{moment}: {one.outcome}")
-
-        rows = fly_missing(flown, trials, place, fault_rows.to_row, measure, show)
-    results = [fault_rows.from_row(row) for row in rows.values()]
+    found = experiment.fly(range(len(cells)), lambda number: make(cells[number], out), _about)
+    results = list(found.values())
     again = _again(options, matrix)
-    summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line(), again)
+    summary, page = report.write(out, matrix, results, vehicle.name, command_line(), again)
     say(summary)
     say(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0
+
+
+def _about(one: FaultResult) -> str:
+    moment = f", {one.moment}" if one.moment else ""
+    return f"{one.fault}{moment}: {one.outcome}"
 
 
 def _again(options: argparse.Namespace, matrix: Matrix) -> str:
@@ -172,14 +171,14 @@ class _Prepared(NamedTuple):
 
 def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription) -> _Prepared:
     """Prepare the flights of the engines of `uam fly`."""
-    from uam_lab.experiments.campaign.fault_trial import FaultTrial, measure
+    from uam_lab.experiments.faults.trial import FaultTrial, measure
 
     profile = given_profile(options.profile, vehicle)
     mass = load_scenario(matrix.scenario, vehicle).payload_mass
     changes = presets.added({}, chosen_effects(options))
 
     def make(cell: Cell, out: Path) -> FaultTrial:
-        trial = Trial(
+        return FaultTrial(
             cell.fault,
             profile,
             mass,
@@ -189,8 +188,8 @@ def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescri
             faults=cell.schedule,
             engine=options.engine,
             clock=options.clock,
+            cell=cell,
         )
-        return FaultTrial(cell, trial)
 
     return _Prepared("faults", make, measure, (profile.sets, profile.bridge(), changes))
 
@@ -199,7 +198,7 @@ def _rehearsals(
     options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription
 ) -> _Prepared:
     """Prepare the rehearsals of the lab file."""
-    from uam_lab.experiments.campaign.rehearsed_trial import RehearsedTrial, measure
+    from uam_lab.experiments.faults.rehearsed import RehearsedTrial, measure
 
     lab = load_lab(options.config)
     profile = settings_of(lab).profile

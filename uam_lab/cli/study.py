@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
 
 from uam_lab.cli.command import place_of
-from uam_lab.cli.counting import Counting
 from uam_lab.experiments.study.description import Study, load_study
-from uam_lab.experiments.study.flights import StudyFlight, StudyResult
-from uam_lab.experiments.workers.place import Workplace
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.atomic import write_rows, write_text
@@ -45,19 +41,6 @@ def run(options: argparse.Namespace) -> int:
     if options.tune:
         return _tune(study, options.tune, out)
     return _fly(study, options, out)
-
-
-def _flier(planned: Sequence[StudyFlight], place: Workplace, out: Path) -> list[StudyResult]:
-    """Fly with a progress bar."""
-    from uam_lab.experiments.study import kept
-
-    with Counting("study", len(planned)) as counting:
-        return kept.fly(
-            planned,
-            place,
-            out,
-            lambda done, r: counting.show(done, f"{r.row}, {r.condition}, seed {r.seed}"),
-        )
 
 
 def _tune(study: Study, evaluations: int, out: Path) -> int:
@@ -98,7 +81,7 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
     parts = tuple(options.part or PARTS)
     texts, said, drawn, flown = [], [], {}, []
     seeds = options.seeds or study.document["seeds"]
-    runner = Runner(study, out, place_of(options), seeds, _flier, options.engine)
+    runner = Runner(study, out, place_of(options), seeds, options.engine)
     if "margins" in parts:
         rows = [row for row in study.rows if row.law and not row.profiles]
         texts.append(report.margin_table(margins(study, rows, runner.converged())))

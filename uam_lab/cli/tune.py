@@ -16,7 +16,7 @@ from uam_lab.cli.command import (
     given_profile,
     place_of,
 )
-from uam_lab.cli.counting import Counting
+from uam_lab.experiments.trials.counting import Counting
 from uam_lab.experiments.tuning.convergence import LEAST, SMALL
 from uam_lab.experiments.tuning.convergence import in_words as convergence
 from uam_lab.experiments.tuning.space import TuningError, load_space

@@ -1,1 +1,1 @@
-"""Many flights in parallel, for `uam campaign`, `uam faults`, `uam tune` and `uam compare`."""
+"""Random flights around the nominal one, for `uam campaign`."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from uam_control.profiles.profile import Profile
 from uam_control.settings.configuration import path
 from uam_control.settings.section import read_section
-from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.trials.trial import Trial
 from uam_lab.flights.flight_settings import LAST_SEED
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
@@ -25,14 +26,6 @@ DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  #
 
 class VariationError(ValueError):
     """The file of ranges is not usable; the text is one line."""
-
-
-@dataclass(frozen=True)
-class Draw:
-    """One random flight. values: name → number, for the statistics; trial: the flight."""
-
-    values: dict[str, float]
-    trial: Trial
 
 
 def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
@@ -54,7 +47,7 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
 
 
 @dataclass(frozen=True)
-class Draws(Sequence[Draw]):
+class Draws(Sequence[Trial]):
     """Random flights, drawn when they are looked at. Flight i depends on the seed and i, not on
     `total`.
 
@@ -80,13 +73,48 @@ class Draws(Sequence[Draw]):
         """Return the number of flights."""
         return self.total
 
-    def __getitem__(self, number: int) -> Draw:
+    def __getitem__(self, number: int) -> Trial:
         """Return flight `number`. Raises IndexError."""
         if not 0 <= number < self.total:
             raise IndexError(number)
         random = np.random.default_rng([self.seed, number])
+        drawn, changes = self._drawn(random)
         seed = self.seed * PER_SEED + number
-        return _one(self.profile, self.scenario, random, seed, self.ranges, self.effects)
+        given = late(*(drawn.get(name, 0.0) for name in DELAYS))
+        faults = tuple(timed(parse_spec(text), {}, "delays") for text in given)
+        return Trial(
+            "random",
+            self.profile,
+            drawn["payload"],
+            seed,
+            self.scenario,
+            vehicle_changes=presets.added(changes, self.effects),
+            faults=Schedule(faults, seed),
+            drawn=drawn,
+        )
+
+    def _drawn(self, random: np.random.Generator) -> tuple[dict[str, float], dict[str, Any]]:
+        """Return name → drawn value, and the changes of the plant's numbers that follow."""
+        allowed = self.ranges
+        drawn = {name: float(random.uniform(*allowed[name])) for name in NAMES}
+        direction = random.uniform(0.0, 2.0 * np.pi)
+        rotors = len(self.profile.vehicle.rotors)
+        efficiency = random.uniform(*allowed["efficiency"], size=rotors)
+        offset = random.uniform(0.0, 2.0 * np.pi)
+        speed, away = drawn["wind"], drawn["payload_offset"]
+        wind = [float(speed * np.cos(direction)), float(speed * np.sin(direction)), 0.0]
+        aside = [float(away * np.cos(offset)), float(away * np.sin(offset))]
+        drawn["efficiency"] = float(efficiency.min())
+        drawn |= {name: float(random.uniform(*allowed[name])) for name in DELAYS if name in allowed}
+        return drawn, {
+            "air.wind": wind,
+            "air.gust": drawn["gust"] * speed,
+            "sensors.noise_scale": drawn["noise"],
+            "variation.mass": drawn["mass"],
+            "variation.inertia": drawn["inertia"],
+            "variation.payload_offset": aside,
+            "rotors.efficiency": efficiency.tolist(),
+        }
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -104,45 +132,6 @@ class Draws(Sequence[Draw]):
         if not all(one.isdecimal() and int(one) < self.total for one in wanted):
             raise VariationError(f"--draws {numbers}: numbers of 0 to {self.total - 1}, as 3,14")
         return sorted({int(one) for one in wanted})
-
-
-def _one(
-    profile: Profile,
-    scenario: str,
-    random: np.random.Generator,
-    seed: int,
-    allowed: dict[str, tuple[float, float]],
-    effects: Effects,
-) -> Draw:
-    drawn = {name: float(random.uniform(*allowed[name])) for name in NAMES}
-    direction = random.uniform(0.0, 2.0 * np.pi)
-    efficiency = random.uniform(*allowed["efficiency"], size=len(profile.vehicle.rotors))
-    offset = random.uniform(0.0, 2.0 * np.pi)
-    speed, away = drawn["wind"], drawn["payload_offset"]
-    drawn["efficiency"] = float(efficiency.min())
-    drawn |= {name: float(random.uniform(*allowed[name])) for name in DELAYS if name in allowed}
-    given = late(*(drawn.get(name, 0.0) for name in DELAYS))
-    faults = tuple(timed(parse_spec(text), {}, "delays") for text in given)
-    changes = {
-        "air.wind": [float(speed * np.cos(direction)), float(speed * np.sin(direction)), 0.0],
-        "air.gust": drawn["gust"] * speed,
-        "sensors.noise_scale": drawn["noise"],
-        "variation.mass": drawn["mass"],
-        "variation.inertia": drawn["inertia"],
-        "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
-        "rotors.efficiency": efficiency.tolist(),
-    }
-    changes = presets.added(changes, effects)
-    trial = Trial(
-        "random",
-        profile,
-        drawn["payload"],
-        seed,
-        scenario,
-        vehicle_changes=changes,
-        faults=Schedule(faults, seed),
-    )
-    return Draw(drawn, trial)
 
 
 def common(

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_lab.experiments.campaign.trial import Trial, TrialResult
 from uam_lab.experiments.compare import plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
+from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import templates, timeseries
 from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import versions, write_json

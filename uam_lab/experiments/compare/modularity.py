@@ -18,8 +18,8 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ATTITUDE
 from uam_control.profiles.profile import Profile, profile_of
-from uam_lab.experiments.campaign.trial import Trial, TrialResult
 from uam_lab.experiments.compare.plan import Flights
+from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant.effects import presets

@@ -16,7 +16,7 @@ from uam_control.profiles.profile import (
     profile_of,
 )
 from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.campaign.trial import Trial
+from uam_lab.experiments.trials.trial import Trial
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 

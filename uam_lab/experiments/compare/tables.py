@@ -10,8 +10,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION, coordinates
-from uam_lab.experiments.campaign.trial import TrialResult
 from uam_lab.experiments.compare.plan import ASMC1, ASMC2, PROPOSED
+from uam_lab.experiments.trials.trial import TrialResult
 from uam_lab.records.results.templates import markdown_table
 from uam_lab.report.facts import paper
 

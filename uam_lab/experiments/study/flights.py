@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import yaml
 
 from uam_control.coordinates import ARM, ATTITUDE
 from uam_control.profiles.profile import Profile
 from uam_lab.analysis import law_terms
-from uam_lab.experiments.campaign.fault_outcome import LOST, classify
-from uam_lab.experiments.campaign.trial import Trial, figures_of, recorded
 from uam_lab.experiments.study.description import Condition, Study
+from uam_lab.experiments.trials.inputs import inputs
+from uam_lab.experiments.trials.outcome import LOST, classify
+from uam_lab.experiments.trials.rows import Rows
+from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
 from uam_lab.records.results.phase_errors import distance, root_mean_square
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
@@ -26,15 +30,14 @@ PLANNED = {"grounded", "taking off", "flying", "landing", "disarmed"}
 FLOWN = "flown"
 PX4 = "position"  # setpoint of a flight whose attitude is PX4's own
 GAINS = ("K0", "K1", "K2", "K3", "zeta", "rho")
+ERRORS = ("position_m", "attitude_deg", "arm_deg")
 
 
-@dataclass(frozen=True)
-class StudyFlight:
-    """One flight. judged: phases that are measured, () for the whole flight."""
+@dataclass(frozen=True, kw_only=True)
+class StudyFlight(Trial):
+    """One flight of a row, its label. judged: phases that are measured, () for the whole flight."""
 
-    row: str
     condition: str
-    trial: Trial
     judged: tuple[str, ...] = ()
 
 
@@ -43,7 +46,7 @@ class StudyResult:
     """Result of one flight, in the judged phases.
 
     errors: RMS of the distance to the reference [m], of the worst attitude angle and the worst
-    joint [deg]; NaN where not measured. outcome: FLOWN, or one of `fault_outcome.OUTCOMES` after a
+    joint [deg]; NaN where not measured. outcome: FLOWN, or one of `outcome.OUTCOMES` after a
     hold, an abort or a loss; the place of the landing does not count. shares: see
     `law_terms.shares`. gains: subsystem → mean of K0..K3, zeta, rho of the modular law.
     """
@@ -54,12 +57,25 @@ class StudyResult:
     errors: tuple[float, float, float]
     outcome: str
     shares: dict[str, dict[str, Any]]
-    gains: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    gains: dict[str, list[float]] = field(default_factory=dict)
 
     @property
     def flown(self) -> bool:
         """Whether all of the reference was flown."""
         return self.outcome == FLOWN
+
+
+ROWS = Rows(StudyResult, {"errors": ERRORS}, pa.field("mark", pa.string()))
+
+
+def mark(flight: StudyFlight) -> str:
+    """Return what identifies the inputs of a flight: profile, scenario, vehicle, seed, code."""
+    given = (
+        *(flight.label, flight.condition, flight.judged, flight.payload_mass, flight.seed),
+        *(sorted(flight.vehicle_changes.items()), flight.faults, flight.profile.sections),
+        *(flight.engine, inputs(flight.profile.vehicle, flight.scenario, {})),
+    )
+    return hashlib.sha256(repr(given).encode()).hexdigest()[:16]
 
 
 def scenario_file(study: Study, condition: Condition, folder: Path) -> Path:
@@ -85,17 +101,14 @@ def flights(
     return [
         StudyFlight(
             label,
-            condition.label,
-            Trial(
-                label,
-                made,
-                0.0,
-                seed,
-                str(scenario_file(study, condition, folder)),
-                vehicle_changes=dict(condition.vehicle),
-                faults=Schedule(tuple(late_by), seed),
-            ),
-            tuple(study.document["judged"]),
+            made,
+            0.0,
+            seed,
+            str(scenario_file(study, condition, folder)),
+            vehicle_changes=dict(condition.vehicle),
+            faults=Schedule(tuple(late_by), seed),
+            condition=condition.label,
+            judged=tuple(study.document["judged"]),
         )
         for label, made in profiles.items()
         for condition in conditions
@@ -103,9 +116,8 @@ def flights(
     ]
 
 
-def measure(flight: StudyFlight) -> StudyResult:
+def measure(trial: StudyFlight) -> StudyResult:
     """Fly; return the result. Raises TrialFailed as `trial.recorded`."""
-    trial = flight.trial
     outcome = recorded(trial)
     series = outcome.series
     figures = figures_of(trial, outcome, outcome.abort_reason)
@@ -113,17 +125,15 @@ def measure(flight: StudyFlight) -> StudyResult:
     states = {change["to"] for change in outcome.transitions}
     if not (outcome.abort_reason or outcome.failure or ended == LOST or states - PLANNED):
         ended = FLOWN
-    rows = judged_rows(series, flight.judged)
+    rows = judged_rows(series, trial.judged)
     by_position = trial.profile.section("mavlink_bridge").get("setpoint") == PX4
     vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
-    shares = law_terms.shares(
-        series, trial.profile.sets, vehicle, trial.payload_mass, flight.judged
-    )
+    shares = law_terms.shares(series, trial.profile.sets, vehicle, trial.payload_mass, trial.judged)
     if by_position:  # nothing acts on the outputs of the other two laws
         shares = {name: found for name, found in shares.items() if name == "arm"}
     return StudyResult(
-        flight.row,
-        flight.condition,
+        trial.label,
+        trial.condition,
         trial.seed,
         errors_of(series, rows, not by_position),
         ended,
@@ -155,10 +165,10 @@ def errors_of(series: Series, rows: np.ndarray, attitude: bool) -> tuple[float, 
     )
 
 
-def _gains(series: Series, rows: np.ndarray) -> dict[str, tuple[float, ...]]:
+def _gains(series: Series, rows: np.ndarray) -> dict[str, list[float]]:
     found = {}
     for name in SUBSYSTEMS:
         columns = [series[f"adaptation.{name}.{gain}"][rows] for gain in GAINS]
         if rows.any() and np.isfinite(columns[0]).all():
-            found[name] = tuple(float(np.mean(column)) for column in columns)
+            found[name] = [float(np.mean(column)) for column in columns]
     return found

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from uam_control.profiles.profile import Profile, load_profile
-from uam_lab.experiments.campaign.trial import Trial
-from uam_lab.experiments.study import design, kept
+from uam_lab.experiments.study import design
 from uam_lab.experiments.study.description import NOMINAL, Condition, Row, Study
-from uam_lab.experiments.study.flights import StudyFlight, StudyResult, flights
+from uam_lab.experiments.study.flights import (
+    ROWS,
+    StudyFlight,
+    StudyResult,
+    flights,
+    mark,
+    measure,
+)
+from uam_lab.experiments.trials.experiment import Experiment
 from uam_lab.experiments.workers.place import Workplace
 
+FILE = "flown.parquet"
 PROPOSED = "proposed"
 SHOWN = (NOMINAL, "hard")  # conditions whose shares are shown in full
 
@@ -76,18 +84,21 @@ class Runner:
         out: Path,
         place: Workplace,
         seeds: int,
-        fly: Callable[[Sequence[StudyFlight], Workplace, Path], list[StudyResult]] = kept.fly,
         engine: str = "direct",
     ) -> None:
-        """fly: flies planned flights there, results kept in the folder; engine: of all flights."""
-        self.study, self._out, self._place, self._all = study, out, place, fly
-        self._engine = engine
+        """engine: of all flights."""
+        self.study, self._out, self._engine = study, out, engine
+        # the key of each row has all inputs of its flight
+        of = {"rows": "of studies"}
+        self._flown = Experiment("study", out / FILE, ROWS, of, place, measure)
         self.seeds = tuple(range(1, seeds + 1))
         self.strength = study.document["strengths"]
 
     def _fly(self, planned: list[StudyFlight]) -> list[StudyResult]:
-        chosen = [replace(one, trial=replace(one.trial, engine=self._engine)) for one in planned]
-        return self._all(chosen, self._place, self._out)
+        chosen = [replace(one, engine=self._engine) for one in planned]
+        marks = list(map(mark, chosen))
+        results = self._flown.fly(marks, dict(zip(marks, chosen, strict=True)).__getitem__, _about)
+        return [results[one] for one in marks]
 
     def _planned(
         self, made: dict[str, Profile], conditions: Sequence[Condition]
@@ -169,13 +180,18 @@ class Runner:
         planned = []
         for label, factor, one in made:
             name = f"{label}, arm x {factor:g}"
-            trial = Trial(name, one, entry["payload"], 1, entry["scenario"])
-            planned.append(StudyFlight(name, entry["scenario"], trial))
+            scenario = entry["scenario"]
+            trial = StudyFlight(name, one, entry["payload"], 1, scenario, condition=scenario)
+            planned.append(trial)
         found = zip(made, self._fly(planned), strict=True)
         return [
             Swept(label, factor, *_delays(design.loop_margins(one, 0.0, _arm_gains(one))), result)
             for (label, factor, one), result in found
         ]
+
+
+def _about(result: StudyResult) -> str:
+    return f"{result.row}, {result.condition}, seed {result.seed}"
 
 
 def _faster_arm(study: Study, factor: float) -> Study:

@@ -20,8 +20,8 @@ from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
-from uam_lab.experiments.campaign.inputs import inputs
-from uam_lab.experiments.campaign.trial import measure
+from uam_lab.experiments.trials.inputs import inputs
+from uam_lab.experiments.trials.trial import measure
 from uam_lab.experiments.tuning.convergence import SMALL, improvement
 from uam_lab.experiments.tuning.front import delay_margin, hypervolumes
 from uam_lab.experiments.tuning.space import Space, TuningError

@@ -14,7 +14,7 @@ from uam_control.profiles.profile import NODES, Profile, default_profile, profil
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.campaign.trial import Trial, TrialResult
+from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
-from uam_lab.experiments.campaign import fault_trial
-from uam_lab.experiments.campaign.fault_matrix import Cell
-from uam_lab.experiments.campaign.fault_outcome import LOST, REFUSED
-from uam_lab.experiments.campaign.fault_trial import FaultResult
+from uam_lab.experiments.faults import trial as fault_trial
+from uam_lab.experiments.faults.matrix import Cell
+from uam_lab.experiments.faults.trial import FaultResult
+from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.rehearsal.flown_rehearsal import fly
@@ -33,7 +33,7 @@ class RehearsedTrial:
     scenario: str
     seed: int
     kept: Path
-    engine: ClassVar[str] = REHEARSAL  # as `flying` asks a Trial
+    engine: ClassVar[str] = REHEARSAL  # as of a Trial
     keep: ClassVar[None] = None
 
 

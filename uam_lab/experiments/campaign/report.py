@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from uam_control.coordinates import BASE_COORDINATES, POSITION
-from uam_lab.experiments.campaign.campaign_figure import picture
-from uam_lab.experiments.campaign.campaign_table import CampaignTable
-from uam_lab.experiments.campaign.fault_outcome import COMPLETED, OUTCOMES
+from uam_lab.experiments.campaign.figure import picture
+from uam_lab.experiments.campaign.flown import Flown
 from uam_lab.experiments.campaign.statistics import percentile, share, sliced
 from uam_lab.experiments.campaign.variations import common
+from uam_lab.experiments.trials.outcome import COMPLETED, OUTCOMES
+from uam_lab.experiments.trials.trial import TrialResult
 from uam_lab.records.results import templates
 from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import versions, write_json
@@ -26,13 +25,15 @@ PERCENTILES = (50, 90, 99)
 WORST = 10  # flights that are listed
 
 
-def write(out: Path, table: pa.Table, vehicle: str, command: str, again: str) -> str:
+def write(
+    out: Path, results: Mapping[int, TrialResult], vehicle: str, command: str, again: str
+) -> str:
     """Write flights.csv, campaign.json, campaign.png, summary.md and report.html; return summary.
 
-    table: of the flights; vehicle: its name; again: command that flies one flight again, to which
-    `--draws NUMBER --replay` is added.
+    results: by the flight's number; vehicle: its name; again: command that flies one flight again,
+    to which `--draws NUMBER --replay` is added.
     """
-    flights = CampaignTable(table)
+    flights = Flown(results)
     shared = common(flights.drawn, flights.failed)
     write_rows(
         out / "flights.csv",
@@ -88,7 +89,7 @@ def write(out: Path, table: pa.Table, vehicle: str, command: str, again: str) ->
     return summary
 
 
-def _listed(flights: CampaignTable, row: int, again: str) -> dict[str, Any]:
+def _listed(flights: Flown, row: int, again: str) -> dict[str, Any]:
     number = int(flights.numbers[row])
     return {
         "flight": number,
@@ -100,7 +101,7 @@ def _listed(flights: CampaignTable, row: int, again: str) -> dict[str, Any]:
     }
 
 
-def _sentence(flights: CampaignTable, vehicle: str) -> str:
+def _sentence(flights: Flown, vehicle: str) -> str:
     count, outcomes = len(flights), flights.outcomes
     done, low, high = (100.0 * x for x in share(outcomes[COMPLETED], count))
     others = [f"{n} {outcome}" for outcome, n in outcomes.items() if n and outcome != COMPLETED]
@@ -110,7 +111,7 @@ def _sentence(flights: CampaignTable, vehicle: str) -> str:
     )
 
 
-def _percentile_rows(flights: CampaignTable) -> list[list[str]]:
+def _percentile_rows(flights: Flown) -> list[list[str]]:
     rows = []
     for name, column in zip(flights.names, flights.rms.T, strict=True):
         unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
@@ -129,7 +130,7 @@ def _with_band(found: tuple[float, float, float], digits: int, unit: str) -> str
 
 
 def _summary(
-    flights: CampaignTable, shared: Sequence[tuple[str, float, float, float]], vehicle: str
+    flights: Flown, shared: Sequence[tuple[str, float, float, float]], vehicle: str
 ) -> Iterator[str]:
     """Yield the paragraphs; shared: see `common`."""
     yield _sentence(flights, vehicle)

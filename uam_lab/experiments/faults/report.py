@@ -10,8 +10,9 @@ from pathlib import Path
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from uam_lab.experiments.campaign.fault_matrix import NOMINAL, Matrix
-from uam_lab.experiments.campaign.fault_outcome import (
+from uam_lab.experiments.faults.matrix import NOMINAL, Matrix
+from uam_lab.experiments.faults.trial import FaultResult
+from uam_lab.experiments.trials.outcome import (
     COMPLETED,
     FAILSAFE,
     HELD,
@@ -21,7 +22,6 @@ from uam_lab.experiments.campaign.fault_outcome import (
     REFUSED,
     counts,
 )
-from uam_lab.experiments.campaign.fault_trial import FaultResult
 from uam_lab.records.results import templates
 from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import versions, write_json
@@ -105,7 +105,7 @@ def write(
         style.save(picture(matrix, results), out / "matrix.png")
     page = out / "report.html"
     text = templates.render(
-        "uam_lab.experiments.campaign",
+        "uam_lab.experiments.faults",
         "faults.html.j2",
         sentence=sentence(results),
         matrix=matrix,

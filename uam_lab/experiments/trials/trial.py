@@ -1,8 +1,9 @@
-"""One flight of a campaign, in either engine, and its result."""
+"""One flight of an experiment, in either engine, and its result."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +14,9 @@ import numpy as np
 from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
-from uam_lab.experiments.campaign.carried import Carried
-from uam_lab.experiments.campaign.fault_outcome import COMPLETED, LOST, classify, explained
+from uam_lab.experiments.trials.carried import Carried
+from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify, explained
+from uam_lab.experiments.trials.rows import Rows
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import ONLOOKERS, FlightSettings
@@ -37,7 +39,7 @@ class Trial:
     """One flight of the profile's vehicle.
 
     label: its row in the tables; keep: file for its time series, if any; carried: for a worker
-    without this machine's files.
+    without this machine's files; drawn: name → value of what was drawn at random.
     """
 
     label: str
@@ -51,6 +53,7 @@ class Trial:
     engine: str = "direct"
     clock: str = "lockstep"
     carried: Carried | None = None
+    drawn: dict[str, float] = field(default_factory=dict)
 
     def load_scenario(self) -> Scenario:
         """Return the scenario, for the vehicle; it is read once. Raises ScenarioError."""
@@ -69,9 +72,9 @@ class TrialResult:
     deg, NaN without a take-off.
 
     flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
-    `fault_outcome.OUTCOMES`; why: see `fault_outcome.explained`. restless: RMS change from
+    `outcome.OUTCOMES`; why: see `outcome.explained`. restless: RMS change from
     tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
-    peaks: the largest value of each adaptation column.
+    peaks: the largest value of each adaptation column; drawn: as in the trial.
     """
 
     label: str
@@ -86,6 +89,7 @@ class TrialResult:
     place_error: float | None
     restless: tuple[float, float]
     peaks: dict[str, float]
+    drawn: dict[str, float] = field(default_factory=dict)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -207,7 +211,15 @@ def measure(trial: Trial) -> TrialResult:
         place_error=figures["payload_place_error_m"],
         restless=(_change(_rates(series)[flown]), _change(series.block("tau_alpha.")[flown])),
         peaks=_peaks(series, flown),
+        drawn=trial.drawn,
     )
+
+
+def result_rows(joints: int, drawn: Sequence[str] = ()) -> Rows:
+    """Return the rows of results, for a vehicle with so many joints; drawn: names of the values."""
+    names = coordinates(joints)
+    parts = {"drawn": drawn, "rms": names, "largest": names, "restless": ("rates", "torques")}
+    return Rows(TrialResult, parts)
 
 
 def _row(groups: dict[str, list[float | None]]) -> np.ndarray:

@@ -10,7 +10,7 @@ from pathlib import Path
 from uam_control.laws.catalogue import LAWS
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.campaign.carried import files_of_model
+from uam_lab.experiments.trials.carried import files_of_model
 from uam_lab.experiments.workers.identity import identity
 
 

@@ -6,6 +6,7 @@ moments, with one of its durations. A value [low, high] in the file is drawn bet
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uam_control.mission import Scenario, load_scenario
-from uam_control.settings.section import read_section
+from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.campaign.fault_outcome import Promise, read_promise
+from uam_lab.experiments.trials.outcome import OUTCOMES
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
 from uam_sim_bridge.faults.feasibility import needs_nodes
 from uam_sim_bridge.faults.schedule import listed, timed
@@ -26,6 +27,44 @@ KEYS = ("scenario", "moments", "faults")
 DURATIONS = "durations"  # optional: of each row without its own; null: for good
 PAIRS = 0.5  # share of the drawn flights with two faults
 AND = " and another"  # after the name of the first fault of two
+
+
+@dataclass(frozen=True)
+class Promise:
+    """outcomes: the allowed ones of OUTCOMES; within [s]: longest time from the fault to the final
+    touchdown, if the mission is not completed; because: part of the reason."""
+
+    outcomes: tuple[str, ...]
+    within: float = math.inf
+    because: str = ""
+
+    def kept(self, outcome: str, down_after: float | None, why: str) -> bool:
+        """Return whether a flight kept the promise.
+
+        down_after [s]: None without touchdown; why: the reason of the end.
+        """
+        soon = down_after is None or down_after <= self.within
+        return outcome in self.outcomes and soon and self.because in why
+
+
+def read_promise(given: Any, where: str) -> Promise:
+    """Read an entry `promise` of a matrix: {outcome: one or a list, within: 8, because: text}.
+
+    Raises FaultError.
+    """
+    if not isinstance(given, dict) or "outcome" not in given:
+        raise FaultError(
+            f"{where}: promise: {{outcome: ..., within: seconds, because: text}} expected"
+        )
+    entry = Section(given, f"{where}: promise:", FaultError)
+    entry.only(("outcome", "within", "because"))
+    named = given["outcome"]
+    outcomes = tuple(named) if isinstance(named, list) else (named,)
+    for one in outcomes:
+        if not isinstance(one, str) or one not in OUTCOMES:
+            raise entry.error("outcome", f"unknown '{one}'; there are: {', '.join(OUTCOMES)}")
+    within = entry.positive("within") if entry.has("within") else math.inf
+    return Promise(outcomes, within, entry.text("because") if entry.has("because") else "")
 
 
 @dataclass(frozen=True)

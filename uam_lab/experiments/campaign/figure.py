@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from uam_lab.experiments.campaign.campaign_table import CampaignTable
+from uam_lab.experiments.campaign.flown import Flown
 from uam_lab.experiments.campaign.statistics import Bin, sliced
 from uam_lab.report.figures import style
 
@@ -15,7 +15,7 @@ COLUMNS = 4  # of small pictures
 LEAST = 1e-6  # [m, deg] smallest error of the logarithmic axis
 
 
-def picture(flights: CampaignTable, vehicle: str) -> Figure:
+def picture(flights: Flown, vehicle: str) -> Figure:
     """Draw a violin per coordinate and, below, two small pictures per drawn value."""
     rows = -(-len(flights.drawn) // COLUMNS)
     figure = Figure(figsize=(style.WIDTH, 2.6 + 3.0 * rows), layout="constrained")
@@ -40,7 +40,7 @@ def picture(flights: CampaignTable, vehicle: str) -> Figure:
     return figure
 
 
-def _distributions(axis: Axes, flights: CampaignTable, vehicle: str) -> None:
+def _distributions(axis: Axes, flights: Flown, vehicle: str) -> None:
     logs = [np.log10(np.maximum(c[np.isfinite(c)], LEAST)) for c in flights.rms.T]
     shown = [k for k, column in enumerate(logs) if column.size]
     if shown:
@@ -65,7 +65,7 @@ def _completed(axis: Axes, bins: list[Bin]) -> None:
     axis.set_ylim(min(90.0, low.min() - 1.0), 100.5)
 
 
-def _errors(axis: Axes, bins: list[Bin], values: np.ndarray, flights: CampaignTable) -> None:
+def _errors(axis: Axes, bins: list[Bin], values: np.ndarray, flights: Flown) -> None:
     """Draw median and 5 to 95 % of the error of each bin; single flights where they are few."""
     low, middle, high = (np.repeat([b.error[k] for b in bins], 2) for k in range(3))
     axis.fill_between(_steps(bins), low, high, color=style.FLIGHTS[0], alpha=0.25, linewidth=0)

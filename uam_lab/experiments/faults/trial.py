@@ -7,24 +7,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from uam_lab.experiments.campaign.fault_matrix import Cell
-from uam_lab.experiments.campaign.fault_outcome import (
+from uam_lab.experiments.faults.matrix import Cell
+from uam_lab.experiments.trials.outcome import (
     COMPLETED,
     LOST,
     classify,
     down_after,
     ending,
 )
-from uam_lab.experiments.campaign.trial import Trial, figures_of, fly
+from uam_lab.experiments.trials.rows import Rows
+from uam_lab.experiments.trials.trial import Trial, figures_of, fly
 from uam_lab.records.results.outcome import Outcome
 
 
-@dataclass(frozen=True)
-class FaultTrial:
-    """One flight, and its cell of the matrix."""
+@dataclass(frozen=True, kw_only=True)
+class FaultTrial(Trial):
+    """One flight, of a cell of the matrix."""
 
     cell: Cell
-    trial: Trial
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ class FaultResult:
     impact: float | None = None
 
 
-def measure(flight: FaultTrial) -> FaultResult:
+def measure(trial: FaultTrial) -> FaultResult:
     """Fly a trial; return its result. Raises ConfigurationError, ScenarioError."""
-    outcome = fly(flight.trial)
-    if outcome.series is None:
-        return judged(flight.cell, outcome, None)
-    return judged(flight.cell, outcome, figures_of(flight.trial, outcome, outcome.reason))
+    outcome = fly(trial)
+    recorded = outcome.series is not None
+    figures = figures_of(trial, outcome, outcome.reason) if recorded else None
+    return judged(trial.cell, outcome, figures)
 
 
 def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> FaultResult:
@@ -88,3 +88,6 @@ def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> F
         tilt_deg=math.degrees(end.largest_tilt),
         impact=end.impact,
     )
+
+
+ROWS = Rows(FaultResult)

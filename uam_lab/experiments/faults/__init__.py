@@ -1,0 +1,1 @@
+"""Faults at every moment of a mission: the matrix, its flights, their outcomes."""

@@ -1,0 +1,1 @@
+"""Flights of an experiment: flown by workers, each once, into a table."""

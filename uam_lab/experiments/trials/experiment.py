@@ -1,0 +1,130 @@
+"""An experiment: flights into the table of a result folder, each once, also after an interruption.
+
+They are flown by workers, or one after another in this process where they need nodes.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from uam_lab.experiments.trials.carried import arrived, carried
+from uam_lab.experiments.trials.counting import Counting
+from uam_lab.experiments.trials.rows import Rows
+from uam_lab.experiments.trials.trial import Trial, measure
+from uam_lab.experiments.workers.place import Workplace
+from uam_lab.experiments.workers.workers import workers
+from uam_lab.flights.direct.warm_up import prepare_direct
+from uam_lab.records.results import row_table
+from uam_lab.records.results.atomic import replacing
+from uam_lab.records.results.terminal import say
+
+Work = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Flights of one kind, and the table of their results.
+
+    name: for the progress; inputs: name → digest of what all flights depend on; work: flies a trial
+    and returns its result.
+    """
+
+    name: str
+    table: Path
+    rows: Rows
+    inputs: Mapping[str, str]
+    place: Workplace
+    work: Work = measure
+
+    def fly(
+        self,
+        keys: Collection[Any],
+        trial: Callable[[Any], Trial],
+        describe: Callable[[Any], str] = lambda result: "",
+    ) -> dict[Any, Any]:
+        """Fly the trials that the table has no row of, or whose file to keep is missing.
+
+        trial: of a key, made when a worker needs it; describe: text about the newest result.
+        Returns key → result of all `keys`, in their order. Raises RowTableError if the table has
+        flights with other inputs.
+        """
+        table = row_table.RowTable(self.table, self.rows.schema, self.inputs)
+
+        def there(key: Any) -> bool:
+            return key in table.keys and ((keep := trial(key).keep) is None or keep.exists())
+
+        missing = [key for key in keys if not there(key)]
+        before = len(keys) - len(missing)
+        if before:
+            say(f"{self.name}: continuing after {before} earlier flights")
+        with Counting(self.name, len(keys)) as counting, table:
+            flown = flown_by(self.place, map(trial, missing), self.work)
+            for done, (number, result) in enumerate(flown, before + 1):
+                table.add(self.rows.to_row(missing[number], result))
+                counting.show(done, describe(result))
+        rows = {row[table.key]: row for row in table.compact().to_pylist()}
+        return {key: self.rows.from_row(rows[key]) for key in keys}
+
+
+def flown_by(
+    place: Workplace, trials: Iterable[Any], work: Work = measure
+) -> Iterator[tuple[int, Any]]:
+    """Yield number and result of each trial, in the order in which they come."""
+    for engine, group in groupby(enumerate(trials), lambda one: one[1].engine):
+        if engine != "direct":  # every node is a process already
+            yield from ((number, work(trial)) for number, trial in group)
+        else:
+            yield from _flown_by_workers(place, group, work)
+
+
+def _flown_by_workers(
+    place: Workplace, numbered: Iterable[tuple[int, Trial]], work: Work
+) -> Iterator[tuple[int, Any]]:
+    numbers: list[int] = []
+    keep: dict[int, Path] = {}  # the files to keep, of the flights that are handed out
+
+    def errands() -> Iterator[_Errand]:
+        for number, trial in numbered:
+            numbers.append(number)
+            if trial.keep is not None:
+                keep[number], trial = trial.keep, replace(trial, keep=Path())
+            if place.scheduler:
+                trial = replace(trial, carried=carried(trial.scenario, trial.profile))
+            yield _Errand(work, trial)
+
+    if not place.scheduler:
+        prepare_direct()  # here once, not in every worker
+    with workers(place, prepare_direct, partial(print, flush=True)) as crew:
+        for k, (result, content) in crew.completed(_run, errands()):
+            number = numbers[k]
+            if number in keep:
+                with replacing(keep.pop(number)) as temporary:
+                    temporary.write_bytes(content)
+            yield number, result
+
+
+@dataclass(frozen=True)
+class _Errand:
+    """What a worker gets. A trial with any file to keep returns the file's content."""
+
+    work: Work
+    trial: Trial
+
+
+def _run(errand: _Errand) -> tuple[Any, bytes | None]:
+    """Fly in a worker; return the result and the content of the file to keep, if any."""
+    trial = errand.trial
+    if trial.carried is not None:
+        trial = replace(trial, profile=arrived(trial.carried, trial.profile))
+    if trial.keep is None:
+        return errand.work(trial), None
+    with tempfile.TemporaryDirectory(prefix="uam-keep-") as folder:
+        file = Path(folder) / "kept.parquet"
+        result = errand.work(replace(trial, keep=file))
+        return result, file.read_bytes()
