@@ -70,6 +70,12 @@ def run(example: str, *arguments: object) -> str:
     return done.stdout
 
 
+def test_an_estimator_of_ones_own_flies(tmp_path):
+    """It hovers as the usual one does, within 0.03 m, with errors of its own."""
+    x, y, z = map(float, run("own_estimator.py", tmp_path / "flown").split()[2:])
+    assert 0.001 < max(x, y, z) < 0.03
+
+
 def test_a_gain_is_swept(tmp_path):
     rows = run("sweep_gain.py", tmp_path).splitlines()[1:]
     assert len(rows) == 3 and all(row.endswith("True") for row in rows)

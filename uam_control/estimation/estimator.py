@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
+from uam_control.estimation.base import BaseParameters, Estimator
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
@@ -33,8 +34,7 @@ from uam_control.maths.rotations import (
     matrix_from_quaternion,
     rotate_back,
 )
-from uam_control.settings.parameter_set import ParameterSet, number
-from uam_control.vehicle import GRAVITY
+from uam_control.settings.parameter_set import choice, number
 
 # rad/s; the noise of the estimated bias grows with the cube of the bandwidth
 QUIET_BANDWIDTH = 24.0
@@ -42,9 +42,12 @@ LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
 
 
 @dataclass(frozen=True)
-class EstimatorParameters(ParameterSet):
+class EstimatorParameters(BaseParameters):
     """Bandwidths and corner frequencies of the estimator's filters, and gravity."""
 
+    estimator: str = choice(
+        "complementary", "the estimator that flies, fixed", ("complementary",), fixed=True
+    )
     position_bandwidth: float = number(
         12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
     )
@@ -69,7 +72,6 @@ class EstimatorParameters(ParameterSet):
     joint_acceleration_cutoff: float = number(
         5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
     )
-    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
 
     def capped(self, interval: float) -> list[str]:
         """Return a line per bandwidth that is too large for a pose every `interval` [s]."""
@@ -101,13 +103,15 @@ REAL = (
 )
 
 
-class StateEstimator:
+class StateEstimator(Estimator):
     """Estimates chi, chi_dot, chi_ddot.
 
     Pass the samples in order of arrival by `mocap`, `imu` and `joints`; `update` returns the state
     at the stamp of the newest IMU sample. `imu_update` is both, in less time. `arrays`: the whole
     state; they are never replaced.
     """
+
+    kind = EstimatorParameters
 
     def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
         """joints: how many the arm has."""
@@ -151,6 +155,15 @@ class StateEstimator:
             "joints": not math.isnan(m.joint_stamp),
         }
         return [name for name, received in seen.items() if not received]
+
+    @property
+    def complete(self) -> bool:
+        """See `complete`."""
+        return complete(self.arrays)
+
+    def forget(self) -> None:
+        """See `forget_samples`."""
+        forget_samples(self.arrays)
 
     @property
     def quaternion(self) -> np.ndarray:

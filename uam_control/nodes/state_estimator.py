@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.estimation import EstimatorParameters
+from uam_control.estimation import catalogue
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
-from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.estimator_stage import EstimatorStage, estimator_stage
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
@@ -23,7 +23,7 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
-from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.node_parameters import NodeParameters, given
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 NAME = "state_estimator"
@@ -49,13 +49,13 @@ class StateEstimatorNode(UamNode):
         super().__init__(NAME, delivery)
         vehicle = described_vehicle(self)
         self._names = list(vehicle.joint_names)
-        section = default_profile(DEFAULT, vehicle).section(NAME)
+        choice = {name: value for name, value in given(self).items() if name == "estimator"}
+        section = catalogue.own_values(default_profile(DEFAULT, vehicle).section(NAME) | choice)
         derived = derived_parameters(vehicle)[NAME]
-        self.parameter_set = NodeParameters(
-            self, EstimatorParameters, defaults=section, derived=derived
-        )
+        kind = catalogue.chosen(section).kind
+        self.parameter_set = NodeParameters(self, kind, defaults=section, derived=derived)
         self._period = vehicle.control_period
-        self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
+        self._stage = self._new_stage()
         self.parameter_set.apply = self._stage.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
@@ -76,6 +76,9 @@ class StateEstimatorNode(UamNode):
         self._refused_before = 0  # number of refused poses at the last report
         self._exposed: deque[int] = deque(maxlen=POSES)  # stamps [ns] since the last report
         self._updates, self._biases = Backlog(), Backlog()
+
+    def _new_stage(self) -> EstimatorStage:
+        return estimator_stage(self.parameter_set.current, len(self._names), self._period)
 
     def _on_mocap(self, data: bytes) -> None:
         stamp, position, quaternion = read_pose(data)
@@ -126,7 +129,7 @@ class StateEstimatorNode(UamNode):
             f"stamps went back from {self._stage.stamp / SECOND:.3f} s to "
             f"{stamp / SECOND:.3f} s: the estimate begins anew"
         )
-        self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
+        self._stage = self._new_stage()
         self.parameter_set.apply = self._stage.set_parameters
         self._diverged_before = 0
 
@@ -168,7 +171,7 @@ class StateEstimatorNode(UamNode):
 
     def _warm_up(self) -> None:
         """Compile the filters with a spare estimator."""
-        spare = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
+        spare = self._new_stage()
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         joints = np.zeros(len(self._names))
         for stamp in range(0, 12_000_000, 4_000_000):

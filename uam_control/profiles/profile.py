@@ -27,7 +27,7 @@ from uam_control.control.output_limits import (
     RateLimits,
 )
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, ROLL, YAW
-from uam_control.estimation import EstimatorParameters
+from uam_control.estimation import catalogue as estimators
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
@@ -44,8 +44,8 @@ CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
     "attitude_controller": (AttitudeLimits, ATTITUDE),
     "arm_controller": (ArmLimits, ARM),
 }
-OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
-NODES = (*CONTROLLERS, *OTHERS)
+ESTIMATOR, MISSION = "state_estimator", "mission"
+NODES = (*CONTROLLERS, ESTIMATOR, MISSION)
 BRIDGE = "mavlink_bridge"
 READ = (*NODES, BRIDGE)  # nodes of a profile; a file may have sections of others
 LIKE = 0.85  # likeness of a name that means one of them
@@ -63,8 +63,8 @@ BRIDGE_LINKS = (
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers", *PROCESS)),
-    "state_estimator": ("vehicle", "odometry_rate", "publishers", *PROCESS),
-    "mission": (
+    ESTIMATOR: ("vehicle", "odometry_rate", "publishers", *PROCESS),
+    MISSION: (
         *("control_period", "scenario", "vehicle", "publishers", "state_timeout", *PROCESS),
         *StartParameters.specs(),
         *ScenarioOptions.specs(),
@@ -133,12 +133,15 @@ def parameter_set(
 ) -> tuple[type[ParameterSet], tuple[str, ...]]:
     """Return the class of a node's parameters and the names of its axes.
 
-    `law` in values, the node's section, selects the class of a controller. The axes of the mission
-    are the joints. vehicle: None for the default one. Raises ParameterError for an unknown law.
+    `law` and `estimator` in values, the node's section, select the class of a controller and of the
+    estimator. The axes of the mission are the joints. vehicle: None for the default one. Raises
+    ParameterError for an unknown name.
     """
     vehicle = vehicle or load_description()
-    if node in OTHERS:
-        return OTHERS[node], vehicle.coordinates[ARM]
+    if node == ESTIMATOR:
+        return estimators.chosen(values).kind, vehicle.coordinates[ARM]
+    if node == MISSION:
+        return MissionParameters, vehicle.coordinates[ARM]
     limits, part = CONTROLLERS[node]
     law = catalogue.law(values.get("law", catalogue.DEFAULT))
     return controller_parameters(law.kind, limits), vehicle.coordinates[part]
@@ -268,12 +271,17 @@ def profile_of(
     """
     sets, vehicle = {}, vehicle or load_description()
     derived = derived_parameters(vehicle)
+    if ESTIMATOR in sections:
+        try:
+            sections = sections | {ESTIMATOR: estimators.own_values(sections[ESTIMATOR])}
+        except ParameterError as error:
+            raise ProfileError(f"{file}: {ESTIMATOR}: {error}") from None
     for node in NODES:
         aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         values = derived.get(node, {}) | values
         try:
-            if node == "mission":
+            if node == MISSION:
                 bases = sets["position_controller"], sets["attitude_controller"]
                 values = reference_limits(*bases, sections.get(BRIDGE, {})) | values
             kind, axes = parameter_set(node, values, vehicle)

@@ -19,7 +19,7 @@ from uam_control.setpoints.setpoint_source import Setpoint
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.autopilot_report import AutopilotReport
 from uam_control.stages.bridge_stage import BridgeStage
-from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.estimator_stage import estimator_stage
 from uam_control.stages.law_stages import LawStage, MeasuredDelay
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
@@ -98,7 +98,7 @@ class ControlTick:
         self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
         estimator, joints = sets["state_estimator"], len(scenario.arm_start)
-        self.estimator = EstimatorStage(estimator, joints, timing.control_period)
+        self.estimator = estimator_stage(estimator, joints, timing.control_period)
         start = StartParameters(auto_start=True)
         mission = Mission(scenario, sets["mission"], start, vehicle, compared=True)
         self.mission = MissionStage(mission, timing)

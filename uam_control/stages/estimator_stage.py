@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import CHI_DDOT
-from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.coordinates import ALPHA, CHI_DDOT
+from uam_control.estimation import StateEstimator, catalogue
+from uam_control.estimation.base import BaseParameters
 from uam_control.estimation.estimator import (
     EstimatorArrays,
     arrays_of,
@@ -31,7 +32,8 @@ HELD_BACK = 1_000_000_000  # [ns] without a state after the estimate has diverge
 # [m, rad, m/s, rad/s] largest believable entry of chi and chi_dot; no vehicle of a room reaches it
 BELIEVABLE = 1e3
 BIAS_PERIOD = 20_000_000  # [ns] between two publications of the estimated biases
-STATE, NONE, OLDER = range(3)  # what a tick gives; OLDER: its stamp does not follow
+# what a tick gives; OLDER: its stamp does not follow; DIVERGED: NONE, and the estimate begins anew
+STATE, NONE, OLDER, DIVERGED = range(4)
 
 
 class PoseAge:
@@ -96,25 +98,27 @@ class EstimatorStage:
 
     bias_due, diverged, held_until = Number(), Number(), Number()
 
-    def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
+    def __init__(self, parameters: BaseParameters, joints: int, period: float) -> None:
         """joints: number of joints of the arm; period [s]: of the control ticks."""
-        self.estimator = StateEstimator(parameters, joints)
+        self.estimator = catalogue.estimator(parameters.estimator)(parameters, joints)
         self.ticks = TickStamps(round(period * SECOND))
         self.pose_age = PoseAge()
         self.memory = record("bias_due diverged held_until waiting")
         self.memory["waiting"] = True
-        self.arrays = a = StageArrays(
-            self.estimator.arrays,
-            self.ticks.memory,
-            self.ticks.window,
-            self.pose_age.memory,
-            self.memory,
-        )
+        self._share(joints)
+
+    def _share(self, joints: int) -> None:
+        """Make `arrays`, and the functions of this stage on them."""
+        self.arrays = a = StageArrays(self.estimator.arrays, *self._own)
         self._state, *_ = arrays_of(a.estimator.memory)
         sample, angles = np.zeros(3), np.zeros(joints)
         self._pose = bound(take_pose, a, 0, sample, np.zeros(4))
         self._readings = bound(take_readings, a, 0, angles, angles)
         self._sample = bound(take_sample, a, 0, sample, sample)
+
+    @property
+    def _own(self) -> tuple[np.ndarray, ...]:
+        return self.ticks.memory, self.ticks.window, self.pose_age.memory, self.memory
 
     @property
     def stamp(self) -> int:
@@ -126,7 +130,7 @@ class EstimatorStage:
         """Return whether no states come because the estimate has diverged."""
         return self.diverged > 0 and self.stamp < self.held_until
 
-    def set_parameters(self, parameters: EstimatorParameters) -> None:
+    def set_parameters(self, parameters: BaseParameters) -> None:
         """Use `parameters` (validated) from the next sample on."""
         self.estimator.set_parameters(parameters)
 
@@ -150,6 +154,45 @@ class EstimatorStage:
         return self._state if found == STATE else None
 
 
+class PlainEstimatorStage(EstimatorStage):
+    """The stage with an estimator in Python, after `Estimator`: its decisions are the same."""
+
+    def _share(self, joints: int) -> None:
+        self.arrays = StageArrays(self.memory, *self._own)  # without those of the estimator
+        self._begin = bound(begin_sample, self.arrays, 0)
+        self._judge = bound(judge, self.arrays, np.zeros((3, ALPHA + joints)))
+
+    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """See `take_pose`."""
+        self.pose_age.pose(stamp)
+        self.estimator.mocap(stamp / SECOND, position, quaternion)
+
+    def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
+        """See `take_readings`."""
+        self.estimator.joints(stamp / SECOND, alpha, alpha_dot)
+
+    def _sample(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> int:
+        """See `take_sample`."""
+        estimator, begun = self.estimator, self._begin(stamp)
+        if begun != STATE:
+            return begun
+        self.bias_due = self.bias_due and estimator.bias_known
+        estimator.imu(self.stamp / SECOND, gyro, force)
+        if not estimator.complete:
+            return NONE
+        self._state = estimator.update()
+        judged = self._judge(self._state)
+        if judged == DIVERGED:
+            estimator.forget()
+        return judged
+
+
+def estimator_stage(parameters: BaseParameters, joints: int, period: float) -> EstimatorStage:
+    """Return the stage of the estimator that the parameters choose; see `EstimatorStage`."""
+    compiled = catalogue.estimator(parameters.estimator) is StateEstimator
+    return (EstimatorStage if compiled else PlainEstimatorStage)(parameters, joints, period)
+
+
 @borrowing
 def take_pose(a: StageArrays, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
     """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
@@ -171,25 +214,45 @@ def take_sample(a: StageArrays, stamp: int, gyro: np.ndarray, force: np.ndarray)
     HELD_BACK after a state that is not finite or not believable: whoever flies by the state
     then reacts as to an estimator that is gone.
     """
-    m, ticks = a.numbers[0], a.ticks[0]
-    before, last = ticks.repeated, ticks.stamp
-    if not follows(a.ticks, stamp):
-        return NONE if ticks.repeated > before else OLDER
-    tick = next_stamp(a.ticks, a.window, stamp)
-    m.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and bias_known(a.estimator)
-    age_at(a.age, tick)
+    begun = begin_sample(a, stamp)
+    if begun != STATE:
+        return begun
+    m, tick = a.numbers[0], a.ticks[0].stamp
+    m.bias_due = m.bias_due and bias_known(a.estimator)
     take_imu(a.estimator, tick / SECOND, gyro, force)
     if m.waiting:
         m.waiting = not complete(a.estimator)
         if m.waiting:
             return NONE
     assemble_stored(a.estimator)
-    if not believable(arrays_of(a.estimator.memory)[0]):
-        m.diverged += 1
-        m.held_until = tick + HELD_BACK
+    judged = judge(a, arrays_of(a.estimator.memory)[0])
+    if judged == DIVERGED:
         m.waiting = True
         forget_samples(a.estimator)
-        return NONE
+    return judged
+
+
+@borrowing
+def begin_sample(a: StageArrays, stamp: int) -> int:
+    """Begin the tick of an IMU sample: STATE if it is one, else see `take_sample`."""
+    m, ticks = a.numbers[0], a.ticks[0]
+    before, last = ticks.repeated, ticks.stamp
+    if not follows(a.ticks, stamp):
+        return NONE if ticks.repeated > before else OLDER
+    tick = next_stamp(a.ticks, a.window, stamp)
+    m.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD
+    age_at(a.age, tick)
+    return STATE
+
+
+@borrowing
+def judge(a: StageArrays, state: np.ndarray) -> int:
+    """Return whether the state (3, 6 + n) of the tick is given: STATE, NONE or DIVERGED."""
+    m, tick = a.numbers[0], a.ticks[0].stamp
+    if not believable(state):
+        m.diverged += 1
+        m.held_until = tick + HELD_BACK
+        return DIVERGED
     return NONE if tick < m.held_until else STATE
 
 
