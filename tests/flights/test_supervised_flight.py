@@ -98,6 +98,19 @@ def test_a_landing_while_the_payload_still_stands_lets_it_go(after):
     landed_softly(made)
 
 
+def test_a_landing_keeps_a_payload_that_has_just_left_its_stand():
+    """At 9.55 s it hangs 1.5 cm higher; the executive decides only at 9.6 s that it is held."""
+    made = flight("quick_pick")
+    output = until(made, lambda o: o.time >= 9.5)
+    assert output.grasp is Grasp.APPROACHED
+    assert made.mission.request(OperatorCommand.LAND)[0]
+    until(made, lambda o: o.done)
+    series = made.recording.series()
+    flown = (series["time"] > 9.5) & (series["truth.z"] > 0.5)
+    assert series["magnet.on"][flown].all() and series["payload.z"][flown].min() > 0.2
+    landed_softly(made)
+
+
 def test_a_payload_that_is_too_heavy_to_lift_is_left_where_it_is():
     made = flight("quick_pick", payload=1.3)
     output = until(made, lambda o: o.done)

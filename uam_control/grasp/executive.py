@@ -42,7 +42,8 @@ CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a c
 
 
 class GraspExecutive:
-    """Watches the grasps of one flight; `decisions`: all so far; `grasp`: newest state."""
+    """Watches the grasps of one flight; `decisions`: all so far; `grasp`: newest state; `lifted`:
+    whether the payload follows the magnet upwards, before that is a decision."""
 
     def __init__(
         self, windows: Sequence[GraspWindow], expected: float, parameters: GraspParameters
@@ -51,7 +52,7 @@ class GraspExecutive:
         self.parameters = parameters
         self.directive = Directive()
         self.decisions: list[GraspDecision] = []
-        self.grasp = Grasp.NONE
+        self.grasp, self.lifted = Grasp.NONE, False
         self._windows, self._expected = list(windows), expected
         self._step, self._since = Step.IDLE, 0.0
         self._attempt = 0
@@ -114,6 +115,7 @@ class GraspExecutive:
         self._step, self._since = step, sight.stamp
         self._lasting.restart()
         self._contact.restart()
+        self.lifted = self.lifted and step is Step.VERIFY
         self.directive.pace = pace
         self.directive.grip = self.directive.grip and step in (Step.DESCEND, Step.LIFT)
 
@@ -220,7 +222,8 @@ class GraspExecutive:
         if self._touches(sight):
             self._leave_contact(sight)
             return
-        pose = by_pose(sight, self.parameters)
+        pose = by_travel(sight, *self._gripped, self.parameters)
+        self.lifted = pose.held is True
         if self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
             self._go_back(sight, f"not held, {pose.text}")
         elif sight.time >= window.lifted:

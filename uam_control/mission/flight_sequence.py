@@ -641,7 +641,7 @@ class Mission:
         if given is not None:
             return given
         down = self._beside or decision.guide is Guide.DESCEND
-        if down and self.output.grasp is Grasp.APPROACHED:
-            return False  # a payload that is not lifted yet: the arm would pull on its stand
+        if down and self._watch is not None and self._watch.standing:
+            return False  # the arm would pull on the payload's stand
         left = self.output.grasp in (Grasp.GIVEN_UP, Grasp.ABSENT)
         return desired and decision.keep_magnet and not left

@@ -8,7 +8,14 @@ import numpy as np
 
 from uam_control.ages import AHEAD
 from uam_control.coordinates import ALPHA, CHI, POSITION, Z
-from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight, grasp_windows
+from uam_control.grasp import (
+    Grasp,
+    GraspDecision,
+    GraspExecutive,
+    GraspWindow,
+    Sight,
+    grasp_windows,
+)
 from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.place_history import PlaceHistory
 from uam_control.maths.compiled import jit, prepared
@@ -100,6 +107,11 @@ class PayloadWatch:
     def grip(self) -> bool:
         """Whether the magnet is on before the scenario switches it on."""
         return self.executive.directive.grip
+
+    @property
+    def standing(self) -> bool:
+        """Whether a payload that was approached has not been lifted from its stand."""
+        return self.executive.grasp is Grasp.APPROACHED and not self.executive.lifted
 
     def interrupt(self) -> None:
         """The scenario is not flown at this tick."""
