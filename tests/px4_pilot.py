@@ -8,7 +8,8 @@ import struct
 import threading
 import time
 
-from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
+from uam_control.offboard.firmware import FIRMWARES
+from uam_control.offboard.modes import MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 PORT = 14550  # of PX4's ground station, whatever its instance
@@ -113,7 +114,7 @@ class Pilot:
                 self._armed = self._now
         elif kind != "CURRENT_MODE":
             return
-        mode = Mode.from_custom_mode(message.custom_mode)
+        mode = FIRMWARES["px4"].mode(message.custom_mode)
         if not self.modes or self.modes[-1][1] is not mode:
             self.modes.append((self.since, mode))
 
@@ -135,7 +136,7 @@ class Pilot:
             for name, value in LOW_BATTERY.items():
                 self._set(name, value)
             return
-        parameters = (CUSTOM_MODE_ENABLED, *self._mode.value, 0, 0, 0, 0)
+        parameters = (*FIRMWARES["px4"].mode_request(self._mode), 0, 0, 0, 0)
         self._send(
             mavlink2.MAVLink_command_long_message(
                 self._system, 1, MavCmd.DO_SET_MODE, 0, *parameters

@@ -15,7 +15,8 @@ from free_port import free_port
 
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
-from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, FORCE, MavCmd, Mode
+from uam_control.offboard.firmware import FIRMWARES
+from uam_control.offboard.modes import FORCE, MavCmd, Mode
 from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description
@@ -64,7 +65,7 @@ class GroundStation:
         self.send(mavlink2.MAVLink_command_long_message(1, 1, command, 0, *values))
 
     def choose(self, mode: Mode) -> None:
-        self.command(MavCmd.DO_SET_MODE, CUSTOM_MODE_ENABLED, *mode.value)
+        self.command(MavCmd.DO_SET_MODE, *FIRMWARES["px4"].mode_request(mode))
 
     def stop_motors(self) -> None:
         self.command(MavCmd.ARM_DISARM, 0.0, FORCE)

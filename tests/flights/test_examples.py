@@ -76,6 +76,10 @@ def test_an_estimator_of_ones_own_flies(tmp_path):
     assert 0.001 < max(x, y, z) < 0.03
 
 
+def test_a_firmware_of_ones_own_is_spoken(tmp_path):
+    assert run("own_firmware.py", tmp_path / "flown").split()[-1] == "True"
+
+
 def test_a_gain_is_swept(tmp_path):
     rows = run("sweep_gain.py", tmp_path).splitlines()[1:]
     assert len(rows) == 3 and all(row.endswith("True") for row in rows)

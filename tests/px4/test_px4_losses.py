@@ -7,6 +7,7 @@ import pytest
 from px4_at_hand import NO_PX4, installation
 from rate_steps import flown_by
 
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
 from uam_control.offboard.sequence import Phase
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
@@ -68,7 +69,7 @@ def test_another_mode_from_a_ground_station_stays(hovering):
         MavCmd.DO_SET_MODE,
         0,
         CUSTOM_MODE_ENABLED,
-        *Mode.LAND.value,
+        *FIRMWARES["px4"].mode_request(Mode.LAND)[1:],
         0,
         0,
         0,

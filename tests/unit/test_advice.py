@@ -4,10 +4,13 @@ import re
 
 import pytest
 
-from uam_control.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
+from uam_control.offboard.firmware import FIRMWARES, SEPARATOR
 from uam_control.offboard.modes import MavResult
 from uam_control.offboard.sequence import OffboardParameters, OffboardSequence, Request
-from uam_sim_bridge.mavlink.telemetry.events import CHECKS, OTHERS
+from uam_sim_bridge.mavlink.telemetry.events import EventTexts
+
+PX4 = FIRMWARES["px4"]
+EVENTS = EventTexts(PX4)
 
 TEXTS = [  # PX4 v1.16.0, STATUSTEXT
     ("Preflight Fail: ekf2 missing data", "EKF2_EV_CTRL"),
@@ -51,22 +54,22 @@ TEXTS = [  # PX4 v1.16.0, STATUSTEXT
 
 @pytest.mark.parametrize(("text", "part"), TEXTS)
 def test_texts_of_px4(text, part):
-    assert part in advice(text)
+    assert part in PX4.advice(text)
 
 
 def test_every_event_in_the_table_has_advice():
-    texts = [text for text, _ in (*CHECKS.values(), *OTHERS.values())]
+    texts = [text for text, _ in (*EVENTS.checks.values(), *EVENTS.others.values())]
     filled = [
         re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "GCS connection loss") for text in texts
     ]
-    assert [text for text in filled if advice(text) is None] == []
+    assert [text for text in filled if PX4.advice(text) is None] == []
 
 
 def test_every_pattern_is_reachable():
     """A pattern that an earlier one always beats is a mistake: each is some text's first match."""
     events = [
         re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "generic")
-        for text, _ in (*CHECKS.values(), *OTHERS.values())
+        for text, _ in (*EVENTS.checks.values(), *EVENTS.others.values())
     ]
     message = (
         [text for text, _ in TEXTS]
@@ -80,15 +83,15 @@ def test_every_pattern_is_reachable():
             "Missing FMU SD Card",
         ]
     )
-    used = {advice(text) for text in message}
-    assert [pattern for pattern, what in ADVICE.items() if what not in used] == []
+    used = {PX4.advice(text) for text in message}
+    assert [pattern for pattern, what in PX4.advice_by_pattern.items() if what not in used] == []
 
 
 def test_unknown_texts_stay_as_they_are():
-    assert with_advice("hello") == "hello"
-    assert with_advice("descending slowly, escaping") == "descending slowly, escaping"
-    once = with_advice("no offboard signal")
-    assert SEPARATOR in once and with_advice(once) == once
+    assert PX4.with_advice("hello") == "hello"
+    assert PX4.with_advice("descending slowly, escaping") == "descending slowly, escaping"
+    once = PX4.with_advice("no offboard signal")
+    assert SEPARATOR in once and PX4.with_advice(once) == once
 
 
 def test_the_sequences_reasons_carry_it():

@@ -8,6 +8,7 @@ from quadrotor import MASS, Quadrotor
 
 from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_multiply
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import FORCE, MavCmd, MavResult, Mode
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
@@ -328,7 +329,10 @@ def test_parameter_files(tmp_path):
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN])
 def test_on_the_ground_hold_and_return_idle_and_disarm(mode):
     bench = Bench().fly()
-    assert bench.command(MavCmd.DO_SET_MODE, 1.0, *mode.value) == MavResult.ACCEPTED
+    assert (
+        bench.command(MavCmd.DO_SET_MODE, *FIRMWARES["px4"].mode_request(mode))
+        == MavResult.ACCEPTED
+    )
     bench.run(9.0)
     assert bench.autopilot.status.armed and np.all(bench.autopilot.motors < 0.1)
     bench.run(2.0)
@@ -338,7 +342,8 @@ def test_on_the_ground_hold_and_return_idle_and_disarm(mode):
 def test_in_position_the_stick_takes_off():
     bench = Bench().fly()
     bench.autopilot.manual(bench.time, (0.0, 0.0, 0.0, 0.0))
-    assert bench.command(MavCmd.DO_SET_MODE, 1.0, *Mode.POSITION.value) == MavResult.ACCEPTED
+    position = FIRMWARES["px4"].mode_request(Mode.POSITION)
+    assert bench.command(MavCmd.DO_SET_MODE, *position) == MavResult.ACCEPTED
     for stick, rises in ((0.0, False), (0.5, True)):
         for _ in range(8):
             bench.autopilot.manual(bench.time, (0.0, 0.0, stick, 0.0))

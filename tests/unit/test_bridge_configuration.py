@@ -4,6 +4,7 @@ import pytest
 import yaml
 
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.sequence import OffboardParameters
 from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.level_hold import HoldParameters
@@ -14,7 +15,7 @@ from uam_control.settings.parameter_set import ParameterSet
 from uam_control.vehicle import derived_parameters, load_description
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
-from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, differences, expected
+from uam_sim_bridge.mavlink.telemetry.parameter_check import differences, expected
 
 BRIDGE = yaml.safe_load(path("bridge/bridge.yaml").read_text())["mavlink_bridge"]["ros__parameters"]
 VEHICLE = load_description()
@@ -43,9 +44,9 @@ def test_the_file_holds_the_defaults(kind: type[ParameterSet]):
 
 def test_the_autopilot_flies_what_the_bridge_assumes():
     autopilot, mapping = Parameters.of(VEHICLE), RateThrustParameters.of(VEHICLE)
-    values = {name: autopilot[name] for name in WATCHED}
+    values = {name: autopilot[name] for name in FIRMWARES["px4"].watched}
     assert list(differences(mapping, values)) == []
-    assert set(expected(mapping)) <= set(WATCHED)
+    assert set(expected(mapping)) <= set(FIRMWARES["px4"].watched)
 
 
 def test_differences_are_named():

@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from uam_control.frames import swap_quaternion, swap_world
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import MavCmd, MavResult, Mode
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_sim_bridge.autopilot.companion import Companion
@@ -66,7 +67,7 @@ def test_heartbeat_is_a_px4_quadrotor_at_1_hz():
     assert len(beats) == 4
     assert beats[0].autopilot == mavlink2.MAV_AUTOPILOT_PX4
     assert beats[0].type == mavlink2.MAV_TYPE_QUADROTOR
-    assert Mode.from_custom_mode(beats[0].custom_mode) is Mode.HOLD
+    assert FIRMWARES["px4"].mode(beats[0].custom_mode) is Mode.HOLD
     assert not beats[0].base_mode & 128
 
 

@@ -6,6 +6,7 @@ import threading
 
 import pytest
 
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import Mode
 from uam_lab.preflight.doctor import autopilot
 from uam_lab.preflight.doctor.finding import Verdict
@@ -71,7 +72,7 @@ def first(findings):
 
 def heartbeat(kind=mavlink2.MAV_AUTOPILOT_PX4, base_mode=1, mode=Mode.HOLD):
     return mavlink2.MAVLink_heartbeat_message(
-        mavlink2.MAV_TYPE_QUADROTOR, kind, base_mode, mode.custom_mode, 4, 3
+        mavlink2.MAV_TYPE_QUADROTOR, kind, base_mode, FIRMWARES["px4"].custom_mode(mode), 4, 3
     )
 
 

@@ -4,18 +4,18 @@ import struct
 
 import pytest
 
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import Severity
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 from uam_sim_bridge.mavlink.telemetry.event_messages import (
     EventMessage,
 )
 from uam_sim_bridge.mavlink.telemetry.events import (
-    CHECKS,
     HEALTH_SUMMARY,
     OFFBOARD,
-    OTHERS,
     SUMMARY,
     EventReader,
+    EventTexts,
     event_id,
 )
 
@@ -50,7 +50,8 @@ class Autopilot:
 def test_numbers_are_px4s():
     # FNV-1a of "a" and "foobar" are published test vectors; the high byte is the component
     assert event_id("a") == 0x010C292C and event_id("foobar") == 0x019CF968
-    names = [*CHECKS, *OTHERS, SUMMARY, HEALTH_SUMMARY]
+    texts = EventTexts(FIRMWARES["px4"])
+    names = [*texts.checks, *texts.others, SUMMARY, HEALTH_SUMMARY]
     assert len({event_id(name) for name in names}) == len(names)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from memory_transport import Memory
 
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import MavCmd, MavResult, Mode
 from uam_control.offboard.sequence import (
     OffboardParameters,
@@ -23,7 +24,6 @@ from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
 from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
-from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED
 from uam_sim_bridge.mavlink.telemetry.streams import ON_CHANGE, ONLY_COUNTED, RATES
 
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -124,7 +124,7 @@ def test_set_up(rig):
     streams = [first for command, first in rig.commands() if command == MavCmd.SET_MESSAGE_INTERVAL]
     assert streams == [*(number for number in RATES if number not in ONLY_COUNTED), *ON_CHANGE]
     read = [clean_text(m.param_id) for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"]
-    assert sorted(read) == sorted(WATCHED)
+    assert sorted(read) == sorted(FIRMWARES["px4"].watched)
     assert link.mapping_read and link.warnings == ()
     assert link.lost == link.bad_bytes == 0 and link.statistics.rate > 30.0
 
@@ -221,7 +221,7 @@ def test_return_after_lost_link_leaves_a_mode_of_the_pilot():
         rig = Rig(return_after_lost_link=True)
         rig.fly().cut = True
         rig.run(wait)
-        rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, *map(float, mode.value)))
+        rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, FIRMWARES["px4"].mode_request(mode))
         rig.run(2.0 - wait)
         rig.cut = False
         rig.run(5.0)
@@ -258,7 +258,7 @@ def test_a_mode_of_a_ground_station_stays(mode):
     """CURRENT_MODE reports the change at once: the next heartbeat may be a second later."""
     rig = Rig(return_after_lost_link=True).fly()
     rig.run(0.5)
-    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, *map(float, mode.value)))
+    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, FIRMWARES["px4"].mode_request(mode))
     rig.run(0.012)
     assert rig.sequence.phase is Phase.RELEASED
     assert rig.sequence.released_to == f"the pilot or a ground station, in {mode.name}"
@@ -499,7 +499,8 @@ def test_an_autopilot_that_does_not_sign_is_refused_with_the_reason(signs):
     mapping = RateThrustParameters.of(load_description())
     link = OffboardLink(memory, sequence, mapping, signing=key)
     codec = Codec(1, 1, key if signs else None)
-    beat = mavlink2.MAVLink_heartbeat_message(2, 12, 1, Mode.HOLD.custom_mode, 3, 3)
+    hold = FIRMWARES["px4"].custom_mode(Mode.HOLD)
+    beat = mavlink2.MAVLink_heartbeat_message(2, 12, 1, hold, 3, 3)
     for tick in range(10):
         memory.to_link.append(codec.encode(beat))
         if signs:  # a forged one beside the true ones

@@ -4,7 +4,6 @@ import numpy as np
 
 from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_control.offboard.sequence import (
-    COMMANDS,
     OffboardParameters,
     OffboardSequence,
     Phase,
@@ -227,7 +226,7 @@ def test_with_the_stand_in():
         request = s.update(t, Reported(True, status.armed, status.mode))
         autopilot.target(t, AttitudeTarget.of_rates(np.zeros(3), 0.0))
         if request:
-            command, parameters = COMMANDS[request]
+            command, parameters = s.commands[request]
             s.answer(request, autopilot.command(t, command, parameters))
         for severity, text in autopilot.commander.take_texts():
             s.text(severity, text)

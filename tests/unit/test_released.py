@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from uam_control.offboard.modes import MavResult, Mode
 from uam_control.offboard.sequence import (
-    COMMANDS,
     NEW_REPORTS,
     OffboardParameters,
     OffboardSequence,
@@ -219,7 +218,7 @@ def test_kill_repeats_until_disarmed_and_nothing_is_armed_after_it(seen):
     flight.run(0.1, seen)
     flight.sequence.kill()
     assert flight.run(10.0, seen) == [Request.KILL] * 20  # every retry_interval of 0.5 s
-    assert COMMANDS[Request.KILL][1] == (0.0, 21196.0)
+    assert OffboardSequence().commands[Request.KILL][1] == (0.0, 21196.0)
     flight.sequence.answer(Request.KILL, MavResult.ACCEPTED)
     silent = seen._replace(connected=False)
     assert flight.run(1.0, silent) == [Request.KILL] * 2  # behind a lost link too
@@ -317,7 +316,7 @@ def test_a_kill_by_the_autopilot_is_final(how, before):
     again = TERMINATED if how == "termination" else OFFBOARD  # the switch is off again
     requests = flight.run(4.4, again)
     assert len(requests) >= 8 and set(requests) == {Request.DISARM}
-    assert COMMANDS[Request.DISARM][1] == (0.0, 0.0)
+    assert OffboardSequence().commands[Request.DISARM][1] == (0.0, 0.0)
     flight.sequence.set_desired(False)
     flight.run(1.0, again)
     assert flight.run(1.0, again) == [Request.KILL] * 2  # lies where PX4 does not see it landed

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memory_transport import Memory
 
+from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
@@ -17,7 +18,7 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, AutopilotState
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
-from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, WRITES
+from uam_sim_bridge.mavlink.telemetry.parameter_check import WRITES
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, BATCH, setting, value_of
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters, Rule
 from uam_sim_bridge.nodes.autopilot_topics import comparison
@@ -118,7 +119,7 @@ class Vehicle:
         counts = []
         for _ in range(round(seconds / 0.1)):
             beat = mavlink2.MAVLink_heartbeat_message(
-                2, 12, 129 if self.armed else 1, Mode.HOLD.custom_mode, 3, 3
+                2, 12, 129 if self.armed else 1, FIRMWARES["px4"].custom_mode(Mode.HOLD), 3, 3
             )
             self.send(beat)
             self.link.poll(self.time)
@@ -149,7 +150,7 @@ class Vehicle:
 
 def good_values():
     """Values that meet every rule, and those of the mapping."""
-    values = dict.fromkeys(WATCHED, 0.15)
+    values = dict.fromkeys(FIRMWARES["px4"].watched, 0.15)
     for name, rule in RULES.items():
         values[name] = rule.values[0] if rule.values else rule.bits or rule.least
     return values
@@ -159,7 +160,7 @@ def test_a_vehicle_as_required_passes():
     vehicle = Vehicle(good_values())
     assert comparison(vehicle.link.parameters).level == STALE
     counts = vehicle.run(5.0)
-    assert max(counts) <= BATCH and sum(counts) == len(set(WATCHED) | set(RULES))
+    assert max(counts) <= BATCH and sum(counts) == len(set(FIRMWARES["px4"].watched) | set(RULES))
     found = comparison(vehicle.link.parameters)
     assert found.passed and found.level == OK and found.read == found.required == len(RULES)
 

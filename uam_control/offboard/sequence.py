@@ -36,9 +36,8 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.maths.memory import Number, record
-from uam_control.offboard.advice import passing, with_advice
+from uam_control.offboard.firmware import PX4, Firmware, firmware
 from uam_control.offboard.modes import (
-    CUSTOM_MODE_ENABLED,
     FORCE,
     MavCmd,
     MavResult,
@@ -46,7 +45,7 @@ from uam_control.offboard.modes import (
     Severity,
     result_word,
 )
-from uam_control.settings.parameter_set import ParameterSet, integer, number, switch
+from uam_control.settings.parameter_set import ParameterSet, integer, number, switch, text
 from uam_control.settings.plain_members import plain_members
 
 LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T
@@ -87,13 +86,14 @@ class Request(Enum):
     KILL = "stopping the motors"
 
 
-# the request as COMMAND_LONG: command, first parameters
-COMMANDS: dict[Request, tuple[MavCmd, tuple[float, ...]]] = {
-    Request.OFFBOARD: (MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)),
-    Request.ARM: (MavCmd.ARM_DISARM, (1.0, 0.0)),
-    Request.DISARM: (MavCmd.ARM_DISARM, (0.0, 0.0)),
-    Request.KILL: (MavCmd.ARM_DISARM, (0.0, FORCE)),
-}
+def commands_of(spoken: Firmware) -> dict[Request, tuple[MavCmd, tuple[float, ...]]]:
+    """Return the requests as COMMAND_LONG: command, first parameters."""
+    return {
+        Request.OFFBOARD: (MavCmd.DO_SET_MODE, spoken.mode_request(Mode.OFFBOARD)),
+        Request.ARM: (MavCmd.ARM_DISARM, (1.0, 0.0)),
+        Request.DISARM: (MavCmd.ARM_DISARM, (0.0, 0.0)),
+        Request.KILL: (MavCmd.ARM_DISARM, (0.0, FORCE)),
+    }
 
 
 class Reported(NamedTuple):
@@ -117,8 +117,11 @@ class Reported(NamedTuple):
 
 @dataclass(frozen=True)
 class OffboardParameters(ParameterSet):
-    """Times and numbers of attempts of the sequence."""
+    """What the autopilot speaks, times and numbers of attempts of the sequence."""
 
+    firmware: str = text(
+        PX4, "firmware of the autopilot, fixed once the node runs", "a name of FIRMWARES"
+    )
     stream_time: float = number(
         1.0, "time of streaming setpoints before the first request for OFFBOARD", "s", 0.0, 30.0
     )
@@ -132,7 +135,7 @@ class OffboardParameters(ParameterSet):
     reason_delay: float = number(
         5.0,
         "time for which a reason must last that the autopilot also gives in a normal start or "
-        "landing (config/px4/passing.yaml)",
+        "landing (passing.yaml of the firmware)",
         "s",
         0.0,
         60.0,
@@ -140,6 +143,10 @@ class OffboardParameters(ParameterSet):
     recovery_attempts: int = integer(
         6, "requests of return_after_lost_link in a whole flight", 0, 10000
     )
+
+    def check_together(self) -> None:
+        """Raise ParameterError for an unknown firmware."""
+        firmware(self.firmware)
 
 
 _BEGIN_AND_END = (
@@ -156,13 +163,16 @@ class OffboardSequence:
     `phase`; `reasons`: the autopilot's answers to refused requests, with advice, newest last;
     `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when the
     autopilot must run its own failsafe; OFFBOARD is then requested no more. `failure`: why the
-    sequence has given up, else ""; `stopped`: the motors must stay still until the next flight.
+    sequence has given up, else ""; `stopped`: the motors must stay still until the next flight;
+    `commands`: each request as command and first parameters, in the words of `firmware`.
     """
 
     _streamed, _time = Number(), Number()
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
         self.parameters = (parameters or OffboardParameters()).validated()
+        self.firmware = firmware(self.parameters.firmware)
+        self.commands = commands_of(self.firmware)
         self.phase = Phase.WAITING
         self.reasons: tuple[str, ...] = ()
         self.released_to = self.failure = ""
@@ -379,7 +389,7 @@ class OffboardSequence:
     def _lasting_reason(self, text: str) -> None:
         """Add a reason; one that may pass only if it has lasted for `reason_delay`."""
         streaming = self.phase not in (Phase.WAITING, Phase.STREAMING)
-        if passing(text, streaming) and self.phase in _BEGIN_AND_END:
+        if self.firmware.passing(text, streaming) and self.phase in _BEGIN_AND_END:
             since = self._passing.setdefault(text, self._time)
             if self._time - since < self.parameters.reason_delay:
                 return
@@ -405,7 +415,7 @@ class OffboardSequence:
         return self._in_flight or self.phase is Phase.ARMING
 
     def _reason(self, text: str) -> None:
-        text = with_advice(text)
+        text = self.firmware.with_advice(text)
         others = tuple(reason for reason in self.reasons if reason != text)
         self.reasons = (*others, text)[-_KEPT_REASONS:]
 

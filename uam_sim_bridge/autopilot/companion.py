@@ -129,10 +129,10 @@ class Companion:
         )
 
     def _set_mode(self, time: float, m: Message) -> None:
-        main, sub = m.custom_mode >> 16 & 0xFF, m.custom_mode >> 24 & 0xFF
-        self._autopilot.command(
-            time, MavCmd.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0)
-        )
+        spoken = self._autopilot.firmware
+        _, *mode = spoken.mode_request(spoken.mode(m.custom_mode))
+        given = *map(float, (m.base_mode, *mode)), 0, 0, 0, 0
+        self._autopilot.command(time, MavCmd.DO_SET_MODE, given)
 
     def _parameter_read(self, time: float, m: Message) -> None:
         names = self._autopilot.parameters.names

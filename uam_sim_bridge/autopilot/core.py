@@ -14,6 +14,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Known, record
+from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.offboard.modes import (
     CUSTOM_MODE_ENABLED,
     FORCE,
@@ -183,8 +184,15 @@ class Autopilot:
 
     _time = Known()
 
-    def __init__(self, parameters: Parameters | None = None, sample_rate: float = 250.0) -> None:
-        """parameters: None for those of the default vehicle; sample_rate [Hz]: of `update`."""
+    def __init__(
+        self,
+        parameters: Parameters | None = None,
+        sample_rate: float = 250.0,
+        spoken: Firmware = FIRMWARES[PX4],
+    ) -> None:
+        """parameters: None for those of the default vehicle; sample_rate [Hz]: of `update`;
+        spoken: whose numbers its modes have."""
+        self.firmware = spoken
         self.parameters = parameters or Parameters.of(load_description())
         self.motors = np.zeros(int(self.parameters["CA_ROTOR_COUNT"]))
         self.estimator = Estimator()
@@ -296,9 +304,8 @@ class Autopilot:
             third = parameters[2]
             if not (math.isfinite(second) and math.isfinite(third)):
                 return MavResult.DENIED
-            try:
-                mode = Mode((int(second), int(third)))
-            except ValueError:
+            mode = self.firmware.requested(int(second), int(third))
+            if mode is Mode.UNKNOWN:
                 return MavResult.DENIED
             return self.commander.request_mode(time, mode, self.estimator.aided(time))
         if command == MavCmd.DO_FLIGHTTERMINATION:

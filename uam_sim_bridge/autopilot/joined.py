@@ -20,7 +20,6 @@ from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Flag, Number, record
 from uam_control.offboard.modes import MavResult, Severity
 from uam_control.offboard.sequence import (
-    COMMANDS,
     LINK_GAP,
     OffboardSequence,
     Reported,
@@ -214,7 +213,8 @@ class JoinedAutopilot(FlightState):
         self.autopilot.vision(self.time, position, quaternion, age_by(stamp, self.time))
 
     def _command(self, request: Request) -> None:
-        self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))
+        command, parameters = self.sequence.commands[request]
+        self._answers.append((request, self.autopilot.command(self.time, command, parameters)))
 
     def _target(self, target: Target) -> None:
         self.autopilot.target(self.time, target)

@@ -37,9 +37,9 @@ def heartbeat(autopilot: Autopilot, time: float) -> Message:
     armed = mavlink2.MAV_MODE_FLAG_SAFETY_ARMED if status.armed else 0
     return mavlink2.MAVLink_heartbeat_message(
         mavlink2.MAV_TYPE_QUADROTOR,
-        mavlink2.MAV_AUTOPILOT_PX4,
+        autopilot.firmware.autopilot,
         mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | armed,
-        status.mode.custom_mode,
+        autopilot.firmware.custom_mode(status.mode),
         state,
         3,
     )
@@ -47,10 +47,8 @@ def heartbeat(autopilot: Autopilot, time: float) -> Message:
 
 def current_mode(autopilot: Autopilot, time: float) -> Message:
     """CURRENT_MODE: the mode that is flown, and the one that was chosen."""
-    status = autopilot.status
-    return mavlink2.MAVLink_current_mode_message(
-        0, status.mode.custom_mode, status.intended.custom_mode
-    )
+    modes = autopilot.status.mode, autopilot.status.intended
+    return mavlink2.MAVLink_current_mode_message(0, *map(autopilot.firmware.custom_mode, modes))
 
 
 def sys_status(autopilot: Autopilot, time: float) -> Message:

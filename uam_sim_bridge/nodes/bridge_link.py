@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from uam_control.offboard.firmware import Firmware
 from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_sim_bridge.faults import LINK, Schedule
@@ -50,7 +51,7 @@ def open_links(
     system = options.autopilot_system
     url = options.autopilot
     signing = Signing.from_text(options.signing_key, options.signing_link_id)
-    required = _required(options.required_parameters, url)
+    required = _required(options.required_parameters, url, sequence.firmware)
     faults = Schedule.from_text(options.faults).only(LINK)
     delay = SetpointDelay.from_text(options.network_delay)
     transport: Transport
@@ -74,9 +75,9 @@ def open_links(
     return Links(link, station, faulty, late, waits)
 
 
-def _required(given: str, url: str) -> RequiredParameters | None:
+def _required(given: str, url: str, spoken: Firmware) -> RequiredParameters | None:
     """Return the required parameters that the bridge's parameter names, None for none."""
     name = given
     if given == AUTO:
         name = VEHICLE if url and parse_url(url).real else NONE
-    return None if name == NONE else RequiredParameters.read(name)
+    return None if name == NONE else RequiredParameters.read(name, spoken)

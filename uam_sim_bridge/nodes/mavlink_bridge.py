@@ -282,12 +282,12 @@ class MavlinkBridgeNode(UamNode):
         if not adopting or link.armed or not link.mapping_read:
             return
         old = self.stage.map.parameters
-        changes = tuple(differences(old, link.values))
+        changes = tuple(differences(old, link.values, link.sequence.firmware))
         if not changes or changes == self._adopted:
             return
         self._adopted = changes
         try:
-            new = adopted(old, link.values)
+            new = adopted(old, link.values, link.sequence.firmware)
         except ParameterError as error:
             self.get_logger().warning(f"the autopilot's parameters are not adopted: {error}")
             return

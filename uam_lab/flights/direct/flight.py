@@ -71,7 +71,8 @@ class DirectFlight:
         described, section = vehicle.description, profile.section("mavlink_bridge")
         check_names(profile)
         self.sequence = OffboardSequence(OffboardParameters.among(section))
-        self.autopilot = JoinedAutopilot(Autopilot(Parameters.of(described)), self.sequence)
+        stand_in = Autopilot(Parameters.of(described), spoken=self.sequence.firmware)
+        self.autopilot = JoinedAutopilot(stand_in, self.sequence)
         bridge = BridgeStage(
             BridgeSets.of(described, section), described, self.autopilot, self.sequence
         )

@@ -7,10 +7,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from uam_control.offboard.modes import MavCmd, Mode
+from uam_control.offboard.firmware import FIRMWARES, Firmware
+from uam_control.offboard.modes import MavCmd
 from uam_lab.preflight.doctor import vehicle_parameters
 from uam_lab.preflight.doctor.finding import Finding, fail, ok, warn
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.telemetry.parameter_reader import ParameterReader
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
@@ -74,13 +76,20 @@ def link(
             yield _silent(url, heard, patience)
             return
         yield describe(url, heard)
-        if heard.heartbeat.autopilot == mavlink2.MAV_AUTOPILOT_PX4:
-            rules = RequiredParameters.read(VEHICLE)
-            names = list(rules)
-            values = vehicle_parameters.read(transport, _codec(), heard.system, names, parameters)
+        spoken = _spoken(heard.heartbeat)
+        if spoken is not None:
+            rules = RequiredParameters.read(VEHICLE, spoken)
+            reader = ParameterReader(rules, as_bytes=spoken.integers_as_bytes)
+            values = vehicle_parameters.read(transport, _codec(), heard.system, reader, parameters)
             yield from vehicle_parameters.findings(values, rules)
     finally:
         transport.close()
+
+
+def _spoken(heartbeat: Message) -> Firmware | None:
+    """Return the firmware of a heartbeat; None for one that is not in FIRMWARES."""
+    of_kind = (one for one in FIRMWARES.values() if one.autopilot == heartbeat.autopilot)
+    return next(of_kind, None)
 
 
 def _codec() -> Codec:
@@ -125,15 +134,15 @@ def describe(url: str, heard: Heard) -> Finding:
     beat = heard.heartbeat
     kind = _name("MAV_AUTOPILOT", beat.autopilot)
     armed = "armed" if beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
-    px4_like = beat.autopilot == mavlink2.MAV_AUTOPILOT_PX4
-    mode = Mode.from_custom_mode(beat.custom_mode).name if px4_like else f"{beat.custom_mode}"
+    spoken = _spoken(beat)
+    mode = f"{beat.custom_mode}" if spoken is None else spoken.mode(beat.custom_mode).name
     number = version(heard.version.flight_sw_version) if heard.version else "version not sent"
     found = (
         f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
         f"{armed}, firmware {number}"
     )
-    if not px4_like:
-        hint = "the bridge uses PX4's modes and parameters: docs/autopilot.md"
+    if spoken is None:
+        hint = f"the bridge speaks {', '.join(FIRMWARES)}: docs/autopilot.md"
         return warn("autopilot", found, hint)
     if armed == "armed":
         return warn("autopilot", f"{found}: ARMED", "mind the propellers; disarm before a flight")

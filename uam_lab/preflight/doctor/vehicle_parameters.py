@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from uam_lab.preflight.doctor.finding import Finding, ok, warn
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
@@ -19,11 +19,11 @@ def read(
     transport: Transport,
     codec: Codec,
     system: int,
-    names: Iterable[str],
+    reader: ParameterReader,
     patience: float = PATIENCE,
 ) -> dict[str, float]:
-    """Return the values of `names` on the autopilot `system`, as far as it answers."""
-    framer, reader = Framer(codec), ParameterReader(names)
+    """Return the values that `reader` asks of the autopilot `system`, as far as it answers."""
+    framer = Framer(codec)
     progress = time.monotonic()
     while not reader.complete and (now := time.monotonic()) < progress + patience:
         for name in reader.due(now):

@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 from uam_control.ages import DISCONNECTED
 from uam_control.offboard.autopilot_magnet import AutopilotMagnet
-from uam_control.offboard.modes import MavCmd, MavResult, Mode, Severity
+from uam_control.offboard.modes import MavCmd, MavResult, Severity
 from uam_control.offboard.sequence import (
-    COMMANDS,
     LINK_GAP,
     OffboardSequence,
     Reported,
@@ -59,7 +58,7 @@ class OffboardLink(FlightState):
     """State of the autopilot from its messages, and the messages to it.
 
     `mode`, `armed`, `intended`, `armed_since`: see `FlightState`; `failsafe`, `landed`, `killed`
-    (the kill switch is engaged): latest report; `values`: its parameters (of WATCHED, and required
+    (the kill switch is engaged): latest report; `values`: its parameters (watched and required
     ones) by name; `parameters`: their comparison; `ignored`: number of messages from other systems
     or for other receivers; `vitals`: battery, estimator and sensors; `reboots`: number of restarts;
     `foreign`: system ids of other autopilots whose heartbeats have come;
@@ -93,8 +92,9 @@ class OffboardLink(FlightState):
         self.streams = StreamCheck({HIGHRES_IMU: imu_rate} if imu_rate else None)
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
-        self._events = EventReader()
-        self.parameters = ParameterWatch(mapping, required)
+        self._firmware = spoken = sequence.firmware
+        self._events = EventReader(spoken)
+        self.parameters = ParameterWatch(mapping, required, spoken)
         self.values = self.parameters.values
         self._transport = transport
         self._target = target_system
@@ -164,7 +164,7 @@ class OffboardLink(FlightState):
     @property
     def loss_time(self) -> float:
         """For how long [s] the autopilot stays in OFFBOARD without setpoints; at least LINK_GAP."""
-        return max(LINK_GAP, self.values.get("COM_OF_LOSS_T", LOSS_TIME))
+        return max(LINK_GAP, self.values.get(self._firmware.loss_time, LOSS_TIME))
 
     @property
     def round_trip(self) -> float | None:
@@ -292,11 +292,11 @@ class OffboardLink(FlightState):
                 self.killed = m.system_status == mavlink2.MAV_STATE_FLIGHT_TERMINATION
                 self.take_heartbeat(
                     time,
-                    Mode.from_custom_mode(m.custom_mode),
+                    self._firmware.mode(m.custom_mode),
                     bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED),
                 )
         elif kind == "CURRENT_MODE":
-            modes = map(Mode.from_custom_mode, (m.custom_mode, m.intended_custom_mode))
+            modes = map(self._firmware.mode, (m.custom_mode, m.intended_custom_mode))
             self.take_current_mode(time, *modes, self.landed)
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
@@ -368,7 +368,7 @@ class OffboardLink(FlightState):
         self.take_accepted(time, request)
 
     def _request(self, request: Request) -> None:
-        command, parameters = COMMANDS[request]
+        command, parameters = self.sequence.commands[request]
         self._command(command, *parameters)
         self._pending[command] = request
 
@@ -390,4 +390,5 @@ class OffboardLink(FlightState):
         for name in self.parameters.due(time):
             self._send(parameter_request(name, self._target))
         for name, value, kind in () if self.armed else self.parameters.to_write(time):
-            self._send(parameter_setting(name, value, kind, self._target))
+            as_bytes = self._firmware.integers_as_bytes
+            self._send(parameter_setting(name, value, kind, self._target, as_bytes))

@@ -13,25 +13,16 @@ therefore returns checks only if the summary excludes arming in OFFBOARD.
 from __future__ import annotations
 
 import struct
+from typing import Any
 
+from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.offboard.modes import Severity
-from uam_control.settings import configuration, yaml_file
 from uam_sim_bridge.mavlink.telemetry.event_messages import ARGUMENTS, EventMessage
 
 OFFBOARD = 1 << 14  # PX4's navigation_mode_group of OFFBOARD
 _AUTOPILOT = 1 << 24  # component of the event's name
 SUMMARY, HEALTH_SUMMARY = "commander_arming_check_summary", "commander_health_summary"
 
-_TEXTS = yaml_file.read(configuration.path("px4/events.yaml"), configuration.ConfigurationError)
-
-
-def _table(section: str) -> dict[str, tuple[str, str]]:
-    """Return name → text, struct format of {0}, {1}, ... in the text."""
-    entries = _TEXTS[section].items()
-    return {name: (text, "") if isinstance(text, str) else tuple(text) for name, text in entries}
-
-
-CHECKS, OTHERS = _table("checks"), _table("others")
 # PX4 lists all modes for these checks; they block OFFBOARD only from severity ERROR on
 _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 _RAISED = {"commander_rc_override", "failsafe_rc_override"}  # severity INFO in PX4, WARNING here
@@ -45,15 +36,41 @@ def event_id(name: str) -> int:
     return value & 0xFFFFFF | _AUTOPILOT
 
 
-_NAMES = {
-    event_id(name): name for name in (*_TEXTS["names"], *CHECKS, *OTHERS, SUMMARY, HEALTH_SUMMARY)
-}
+class EventTexts:
+    """Texts of a firmware's events by name: (text, struct format of {0}, {1}, ...).
+
+    `checks`: of arming and health; `others`; `names`: event's id → name of every known event.
+    """
+
+    def __init__(self, spoken: Firmware) -> None:
+        self._given: dict[str, Any] = spoken.table("events")
+        self.checks, self.others = self._table("checks"), self._table("others")
+        every = *self._given.get("names", ()), *self.checks, *self.others, SUMMARY, HEALTH_SUMMARY
+        self.names = {event_id(name): name for name in every}
+
+    def _table(self, section: str) -> dict[str, tuple[str, str]]:
+        found = self._given.get(section, {}).items()
+        return {name: (text, "") if isinstance(text, str) else tuple(text) for name, text in found}
+
+    def failsafe(self, name: str, arguments: bytes) -> str:
+        """Return the text of one of `others` with its arguments, action and cause in words."""
+        text, layout = self.others[name]
+        values = struct.unpack_from("<" + layout, arguments)
+        action = self._word("actions", values[1]) if len(values) > 1 else ""
+        cause = self._word("causes", values[-1]) if "{cause}" in text else ""
+        return text.format(*values, action=action, cause=cause)
+
+    def _word(self, section: str, index: int) -> str:
+        words = self._given[section]
+        return words[index] if index < len(words) else str(index)
 
 
 class EventReader:
     """Converts EVENT messages to text; stores whether the last summary excludes OFFBOARD."""
 
-    def __init__(self) -> None:
+    def __init__(self, spoken: Firmware = FIRMWARES[PX4]) -> None:
+        """spoken: the firmware whose events these are."""
+        self._texts = EventTexts(spoken)
         self._blocked = False
         self._last: int | None = None
 
@@ -62,26 +79,25 @@ class EventReader:
         if message.sequence == self._last:  # repeated event
             return None
         self._last = message.sequence
-        name = _NAMES.get(message.event, "")
+        name = self._texts.names.get(message.event, "")
         arguments = bytes(message.arguments).ljust(ARGUMENTS, b"\0")
         severity = message.log_levels & 0xF
         if name == SUMMARY:
             _, _, _, can_arm, _ = struct.unpack_from("<BIIII", arguments)
             self._blocked = not can_arm & OFFBOARD
-        elif name in CHECKS:
+        elif name in self._texts.checks:
             return self._check(name, severity, arguments)
-        elif name in OTHERS:
-            text, layout = OTHERS[name]
+        elif name in self._texts.others:
             if name in _RAISED:
                 severity = min(severity, Severity.WARNING)
-            return severity, _failsafe_text(text, struct.unpack_from("<" + layout, arguments))
+            return severity, self._texts.failsafe(name, arguments)
         elif severity <= Severity.ERROR:
             known = f"event {name}" if name else f"event {message.event:#010x}, of unknown name"
             return severity, f"{known}: see PX4's log"
         return None
 
     def _check(self, name: str, severity: int, arguments: bytes) -> tuple[int, str] | None:
-        text, layout = CHECKS[name]
+        text, layout = self._texts.checks[name]
         modes, _component, *values = struct.unpack_from("<IB" + layout, arguments)
         if not self._blocked or not modes & OFFBOARD:
             return None
@@ -89,14 +105,3 @@ class EventReader:
             return None
         # blocks arming: at least WARNING, also where PX4 sends INFO
         return min(severity, Severity.WARNING), text.format(*values)
-
-
-def _failsafe_text(text: str, values: tuple[int, ...]) -> str:
-    action = _word("actions", values[1]) if len(values) > 1 else ""
-    cause = _word("causes", values[-1]) if "{cause}" in text else ""
-    return text.format(*values, action=action, cause=cause)
-
-
-def _word(section: str, index: int) -> str:
-    words = _TEXTS[section]
-    return words[index] if index < len(words) else str(index)

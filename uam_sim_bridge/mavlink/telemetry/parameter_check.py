@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
+from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Message
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, RETRY, ParameterReader
@@ -15,67 +17,62 @@ from uam_sim_bridge.mavlink.telemetry.required_parameters import (
     same,
 )
 
-_AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
-# parameters read from the autopilot; those that the mapping does not use are only recorded
-WATCHED = (
-    *(f"MC_{axis}_{what}" for axis in _AXES for what in "PIDK"),
-    "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
-)  # fmt: skip
 WRITES = 3  # of each parameter that is set
 HICCUP = 0.5  # s, longest normal gap in the setpoint stream (busy computer or link)
 
 
-def expected(mapping: RateThrustParameters) -> dict[str, float]:
+def expected(mapping: RateThrustParameters, spoken: Firmware = FIRMWARES[PX4]) -> dict[str, float]:
     """Return the autopilot's parameters, by name, that the mapping assumes."""
-    values = {"THR_MDL_FAC": mapping.thr_mdl_fac}
-    for axis, p, k in zip(_AXES, mapping.rate_p, mapping.rate_k, strict=True):
-        values[f"MC_{axis}_P"], values[f"MC_{axis}_K"] = p, k
-    return values
+    values = ((name, getattr(mapping, field), i) for name, (field, i) in spoken.mapped.items())
+    return {name: value if axis is None else value[axis] for name, value, axis in values}
 
 
-def differences(mapping: RateThrustParameters, values: dict[str, float]) -> Iterator[str]:
+def differences(
+    mapping: RateThrustParameters, values: dict[str, float], spoken: Firmware = FIRMWARES[PX4]
+) -> Iterator[str]:
     """Yield one line for each parameter in `values` that disagrees with the mapping."""
-    for name, assumed in expected(mapping).items():
+    for name, assumed in expected(mapping, spoken).items():
         found = values.get(name)
         if found is not None and not same(found, assumed):
             yield f"{name} is {found:g} on the autopilot, the bridge assumes {assumed:g}"
 
 
-def adopted(mapping: RateThrustParameters, values: dict[str, float]) -> RateThrustParameters:
+def adopted(
+    mapping: RateThrustParameters, values: dict[str, float], spoken: Firmware = FIRMWARES[PX4]
+) -> RateThrustParameters:
     """Return the mapping with the autopilot's values in place of the assumed ones.
 
     Raises ParameterError, naming the value, if a value is outside the mapping's range.
     """
-    if not any(True for _ in differences(mapping, values)):
+    if not any(True for _ in differences(mapping, values, spoken)):
         return mapping
-    taken = expected(mapping) | values
-
-    def axes(what: str) -> tuple[float, ...]:
+    taken: dict[str, Any] = {}
+    for name, (field, axis) in spoken.mapped.items():
+        if name not in values:
+            continue
         # 32-bit floats have seven digits: 0.15, not 0.15000000596
-        return tuple(float(f"{taken[f'MC_{axis}_{what}']:.7g}") for axis in _AXES)
-
-    return replace(
-        mapping,
-        rate_p=axes("P"),
-        rate_k=axes("K"),
-        thr_mdl_fac=float(f"{taken['THR_MDL_FAC']:.7g}"),
-    ).validated()
+        value = float(f"{values[name]:.7g}")
+        if axis is not None:
+            vector = list(taken.get(field, getattr(mapping, field)))
+            vector[axis], value = value, vector
+        taken[field] = tuple(value) if axis is not None else value
+    return replace(mapping, **taken).validated()
 
 
-def stream_loss(values: dict[str, float]) -> Iterator[str]:
-    """Yield a warning if COM_OF_LOSS_T is shorter than HICCUP.
+def stream_loss(values: dict[str, float], spoken: Firmware = FIRMWARES[PX4]) -> Iterator[str]:
+    """Yield a warning if the time of a lost stream (PX4: COM_OF_LOSS_T) is shorter than HICCUP.
 
-    On a loss of controller commands the bridge itself streams a level hold. COM_OF_LOSS_T covers
-    a loss of the bridge or of the link.
+    On a loss of controller commands the bridge itself streams a level hold. This time covers a loss
+    of the bridge or of the link.
     """
-    wait = values.get("COM_OF_LOSS_T")
+    wait = values.get(spoken.loss_time)
     if wait is None:
         return
     if wait <= 0.0:
-        yield "COM_OF_LOSS_T is 0 on the autopilot: any late setpoint starts its failsafe"
+        yield f"{spoken.loss_time} is 0 on the autopilot: any late setpoint starts its failsafe"
     elif wait < HICCUP and not same(wait, HICCUP):
         yield (
-            f"COM_OF_LOSS_T is {wait:g} s on the autopilot: a gap of {HICCUP:g} s between "
+            f"{spoken.loss_time} is {wait:g} s on the autopilot: a gap of {HICCUP:g} s between "
             "setpoints starts its failsafe; set a longer time"
         )
 
@@ -87,18 +84,24 @@ def unanswered(names: Iterable[str], attempts: int) -> Iterator[str]:
 
 
 class ParameterWatch:
-    """Reads the parameters of WATCHED and those required, and compares them.
+    """Reads the firmware's watched parameters and those required, and compares them.
 
     `values`: received parameters by name; `warnings`: one line per problem; `writing`: whether
     `to_write` returns parameters; `written`: one line per parameter that it has returned.
     """
 
     def __init__(
-        self, mapping: RateThrustParameters, required: RequiredParameters | None = None
+        self,
+        mapping: RateThrustParameters,
+        required: RequiredParameters | None = None,
+        spoken: Firmware = FIRMWARES[PX4],
     ) -> None:
+        """spoken: the firmware whose parameters these are."""
+        self._spoken = spoken
         self.warnings: tuple[str, ...] = ()
         self.required = RequiredParameters() if required is None else required
-        self._reader = ParameterReader((*WATCHED, *self.required), self.required.instead)
+        names = (*spoken.watched, *self.required)
+        self._reader = ParameterReader(names, self.required.instead, spoken.integers_as_bytes)
         self.values = self._reader.values
         self._mapping = mapping
         self.writing, self.written = False, ()
@@ -120,7 +123,7 @@ class ParameterWatch:
     @property
     def mapping_read(self) -> bool:
         """Return whether every parameter that the mapping assumes has been received."""
-        return all(name in self.values for name in expected(self._mapping))
+        return all(name in self.values for name in expected(self._mapping, self._spoken))
 
     @property
     def complete(self) -> bool:
@@ -186,8 +189,8 @@ class ParameterWatch:
     def _compare(self) -> None:
         given_up = self._reader.missing if self._reader.given_up else ()
         self.warnings = (
-            *differences(self._mapping, self.values),
-            *stream_loss(self.values),
+            *differences(self._mapping, self.values, self._spoken),
+            *stream_loss(self.values, self._spoken),
             *unanswered((name for name in given_up if name not in self.required), ATTEMPTS),
             *(difference.text for difference in self.differences),
         )

@@ -1,7 +1,7 @@
 """Reads parameters of the autopilot by name: which to request when, and the values received.
 
 PX4 sends an integer parameter as four bytes in the float field of PARAM_VALUE; param_type gives
-the type.
+the type. Other firmwares send its value.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ _INTEGERS = {
 }  # fmt: skip
 
 
-def value_of(message: Message) -> float:
-    """Return the value of a PARAM_VALUE, for float and integer parameters."""
+def value_of(message: Message, as_bytes: bool = True) -> float:
+    """Return the value of a PARAM_VALUE; as_bytes: see `Firmware.integers_as_bytes`."""
     layout = _INTEGERS.get(message.param_type)
-    if layout is None:
+    if layout is None or not as_bytes:
         return message.param_value
     return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
 
 
-def setting(name: str, value: float, kind: int, system: int) -> Message:
-    """Return the PARAM_SET of a parameter of the autopilot `system`; kind: MAV_PARAM_TYPE."""
+def setting(name: str, value: float, kind: int, system: int, as_bytes: bool = True) -> Message:
+    """Return the PARAM_SET of a parameter of the autopilot `system`; kind: MAV_PARAM_TYPE;
+    as_bytes: see `Firmware.integers_as_bytes`."""
     layout = _INTEGERS.get(kind)
-    if layout is not None:
+    if layout is not None and as_bytes:
         value = struct.unpack("<f", struct.pack(layout, round(value)))[0]
     return mavlink2.MAVLink_param_set_message(
         system, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), value, kind
@@ -43,9 +44,15 @@ class ParameterReader:
     """`values`: received parameters by name; `types`: their MAV_PARAM_TYPE; `given_up`: ATTEMPTS
     requests of the rest failed."""
 
-    def __init__(self, names: Iterable[str], instead: Mapping[str, str] | None = None) -> None:
-        """instead: name → other one; a name is not waited for once the other has come."""
-        self._instead = dict(instead or {})
+    def __init__(
+        self,
+        names: Iterable[str],
+        instead: Mapping[str, str] | None = None,
+        as_bytes: bool = True,
+    ) -> None:
+        """instead: name → other one; a name is not waited for once the other has come; as_bytes:
+        see `Firmware.integers_as_bytes`."""
+        self._instead, self._as_bytes = dict(instead or {}), as_bytes
         self.names = tuple(dict.fromkeys(names))
         self.values: dict[str, float] = {}
         self.types: dict[str, int] = {}
@@ -74,7 +81,7 @@ class ParameterReader:
         name = clean_text(message.param_id)
         if name not in self._attempts:
             return ""
-        self.values[name] = value_of(message)
+        self.values[name] = value_of(message, self._as_bytes)
         self.types[name] = message.param_type
         return name
 

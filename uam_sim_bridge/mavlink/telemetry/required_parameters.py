@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.configuration import ConfigurationError
 
@@ -90,12 +91,14 @@ class RequiredParameters(dict[str, Rule]):
     """Rules by the name of the parameter."""
 
     @classmethod
-    def read(cls, given: str) -> RequiredParameters:
-        """Return the rules of config/px4/`given`.yaml, or of the file `given`.
+    def read(cls, given: str, spoken: Firmware = FIRMWARES[PX4]) -> RequiredParameters:
+        """Return the rules of the firmware's file `given`.yaml, or of the file `given`.
 
         Raises ConfigurationError in one line: file, parameter, what is allowed.
         """
-        file = Path(given) if Path(given).suffix else configuration.path(f"px4/{given}.yaml")
+        file = Path(given)
+        if not file.suffix:
+            file = configuration.path(str(spoken.folder / f"{given}.yaml"))
         sections = yaml_file.read(file, ConfigurationError)
         if not isinstance(sections, dict):
             raise ConfigurationError(f"{file}: sections of 'NAME: {{rule, why}}' lines expected")
