@@ -10,9 +10,9 @@ from rcl_interfaces.srv import ListParameters, SetParameters, SetParametersAtomi
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from uam_msgs_py.node import arrivals, other_entities
+from uam_msgs_py.node import other_entities
 from uam_msgs_py.node.answering import ServingExecutor
-from uam_msgs_py.node.other_entities import OtherEntities
+from uam_msgs_py.node.other_entities import TURNS, OtherEntities
 
 NAMES = ("first", "second", "third")
 KINDS = (ListParameters, SetParameters, SetParametersAtomically, Trigger)
@@ -64,11 +64,7 @@ def test_the_services_of_every_node_are_answered(probe):
             assert answer(probe, serve, Trigger.Request(), "land").message == "landing"
 
 
-@pytest.mark.parametrize("told", [True, False], ids=["told of requests", "asking all"])
-def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monkeypatch, told):
-    monkeypatch.setattr(other_entities, "FULL_PERIOD", 3600.0)
-    if not told:  # as without compiled functions
-        monkeypatch.setattr(arrivals, "_note", lambda: None)
+def test_services_of_parameters_take_turns_and_others_are_asked_at_every_check(probe, monkeypatch):
     asked = []
 
     def answered(service):
@@ -77,12 +73,13 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
 
     answer_it = other_entities.answered
     monkeypatch.setattr(other_entities, "answered", answered)
-    with served("quiet") as (nodes, rest):
-        services = len(list(nodes[0].services))
-        rest.serve(0)
-        assert len(asked) == services  # at first a request may wait in each
-        rest.serve(0)
-        assert len(asked) == services * (1 if told else 2)
+    with served("quiet", "calm") as (nodes, rest):
+        (land,) = (one for one in nodes[0].services if one.service_name.endswith("/land"))
+        for _ in range(TURNS):
+            rest.serve(0)
+        assert asked.count(land) == TURNS
+        others = [one for node in nodes for one in node.services if one is not land]
+        assert len(others) >= 12 and all(asked.count(one) == 1 for one in others)
         client = probe.node.create_client(Trigger, "land")
         probe.until(client.service_is_ready, "land")
         futures = [client.call_async(Trigger.Request()) for _ in range(3)]
@@ -93,16 +90,6 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
 
         probe.until(all_answered, "three answers to three requests at once")
         assert [future.result().message for future in futures] == ["landing"] * 3
-        asked.clear()
-        rest.serve(0)
-        assert bool(asked) is not told
-
-
-def test_a_request_that_nobody_told_of_is_answered_within_a_second_or_two(probe, monkeypatch):
-    monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.OK)
-    with served("untold") as (_, rest):
-        rest.serve(0)
-        assert answer(probe, partial(rest.serve, 0), Trigger.Request(), "land").message == "landing"
 
 
 @pytest.mark.parametrize("name", ["set_parameters", "set_parameters_atomically"])

@@ -2,10 +2,10 @@
 
 They are checked fifty times a second, of wall time or of tick time, events once a second of wall
 time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
-check, so that many do not delay a tick. A service is asked for its request once the middleware has
-told of one (`arrivals`), and once a second without: a wait set needs ten microseconds for each
-entity. Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that
-executor would serve waiting messages first.
+check, so that many do not delay a tick. Services are asked one by one: a wait set needs ten
+microseconds for each entity, asking takes one. The seven that every node has take
+turns: five times a second each. Clients and events are passed to a SingleThreadedExecutor. Service
+requests are not: that executor would serve waiting messages first.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 
 from uam_msgs_py.node.answering import answered
-from uam_msgs_py.node.arrivals import Arrivals
 from uam_msgs_py.node.waiting import WaitSet
 
 REST_PERIOD = 0.02  # s between two checks
 REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 REPORT_PERIOD = 500_000_000  # ns, from which a timer's period is that of a report
-FULL_PERIOD = 1.0  # s between two checks of events, which only report, and of every service
+EVENT_PERIOD = 1.0  # s between two checks of events, which only report
+OF_EVERY_NODE = "rcl_interfaces", "type_description_interfaces"  # modules of their services
+TURNS = 10  # checks in which each of these is asked once
 
 
 class OtherEntities:
@@ -35,14 +36,17 @@ class OtherEntities:
         self._executor = SingleThreadedExecutor(context=self._context)
         for node in nodes:
             self._executor.add_node(node)
-        self._next_check, self._checked_at, self._next_full_check = 0.0, 0, 0.0
-        self._requests = Arrivals()
+        self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
+        self._turn = 0
         self.gather()
 
     def gather(self) -> None:
         """Collect the nodes' entities; call it when they have changed."""
         nodes = self._nodes
-        self._requests.watch([service for node in nodes for service in node.services])
+        services = [service for node in nodes for service in node.services]
+        shared = [one for one in services if one.srv_type.__module__.startswith(OF_EVERY_NODE)]
+        own = [one for one in services if one not in shared]
+        self._services = [[*own, *shared[turn::TURNS]] for turn in range(TURNS)]
         self._clients = [c.handle for node in nodes for c in node.clients]
         self._timers = [t for node in nodes for t in node.timers]
         self._waitables = [w for node in nodes for w in node.waitables]
@@ -73,9 +77,8 @@ class OtherEntities:
         """Serve what is ready; return whether a service, client or event was."""
         handed = self._answered_clients()
         now = time.monotonic()
-        if now >= self._next_full_check:
-            self._next_full_check = now + FULL_PERIOD
-            self._requests.ask_all()
+        if now >= self._next_events:
+            self._next_events = now + EVENT_PERIOD
             handed += self._ready_events()
         for _ in range(handed):
             self._executor.spin_once(timeout_sec=0)
@@ -83,11 +86,13 @@ class OtherEntities:
         return self._answer_one() or bool(handed)
 
     def _answer_one(self) -> bool:
-        """Answer the first service request that waits; return whether there was one."""
-        for service in self._requests.waiting():
-            if answered(service):
-                self._requests.more(service)
-                return True
+        """Answer the first request of a service whose turn it is; return whether there was one.
+
+        The turn ends with a check without a request.
+        """
+        if any(map(answered, self._services[self._turn])):
+            return True
+        self._turn = (self._turn + 1) % TURNS
         return False
 
     def _answered_clients(self) -> int:

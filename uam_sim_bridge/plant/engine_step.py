@@ -18,7 +18,6 @@ from pathlib import Path
 import mujoco
 
 from uam_control.maths import compiled
-from uam_control.maths.assembly import machine_code
 
 _LIBRARY = str(next(Path(mujoco.__file__).parent.glob("libmujoco*")))
 _NAME = "uam_guarded_mj_step"
@@ -54,13 +53,21 @@ end:
 """
 
 
+_GUARD_OWNER: list[object] = []  # of its machine code: it stays until the process ends
+
+
 def _compiled_step() -> Callable[[int, int], int]:
     """Return mj_step(model, data) for compiled functions."""
     from llvmlite import binding
     from numba import types
 
     binding.load_library_permanently(_LIBRARY)
-    binding.add_symbol(_NAME, machine_code(_GUARD, _NAME))
+    binding.initialize_native_target()  # numba does so at its first function only
+    binding.initialize_native_asmprinter()
+    machine = binding.Target.from_default_triple().create_target_machine()
+    _GUARD_OWNER.append(binding.create_mcjit_compiler(binding.parse_assembly(_GUARD), machine))
+    _GUARD_OWNER[0].finalize_object()
+    binding.add_symbol(_NAME, _GUARD_OWNER[0].get_function_address(_NAME))
     return types.ExternalFunction(_NAME, types.intp(types.intp, types.intp))
 
 
