@@ -18,6 +18,7 @@ FORWARDED = 0.25  # poses: to the autopilot, and in the comparisons of superviso
 HOLD = 0.25  # poses, joint angles, gains of a controller: the vehicle holds, then lands
 AHEAD_FOR = 0.35  # for so long poses wait for an IMU that comes late; more is an error of a clock
 UNAIDED = 0.5  # without a pose for so long an estimate may be far off, in the autopilot, too
+SILENT = 0.5  # reports of the bridge: nobody may follow the mission any more
 LAND = 0.75  # reports of autopilot and bridge: the vehicle lands
 FAILSAFE = 1.0  # poses, and the estimate: the autopilot descends by itself
 BRIDGED = FAILSAFE  # poses: the estimate's past reaches back so far; an older one is none for all

@@ -11,6 +11,7 @@ from uam_control.estimation.pose_clock import PoseClock
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.offboard.sequence import LINK_GAP
 from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.stages.autopilot_report import REPORT_PERIOD
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.vehicle.loading import LONGEST_PERIOD
 from uam_sim_bridge.autopilot import autopilot_estimator
@@ -29,6 +30,7 @@ def test_the_order_of_the_ages_makes_sense():
     blind = ages.FAILSAFE + SupervisionParameters().blind_time
     assert blind + 3.0 / 0.7 < ages.REJECTED <= ages.OTHER_CLOCK
     # a stream that is lost is seen here before the autopilot leaves OFFBOARD by itself
+    assert 2e-9 * REPORT_PERIOD < ages.SILENT < ages.LAND  # one lost report is no silence
     assert ages.STALE < LINK_GAP < STREAM_GAP <= HoldParameters().release_time
 
 

@@ -349,6 +349,21 @@ def test_the_magnet_of_a_released_vehicle_follows_the_policy():
     assert not released(at=50.0, magnet_released="release").step().magnet
 
 
+@pytest.mark.parametrize(
+    ("name", "age", "yields"),
+    [("quick_pick", 0.6, True), ("quick_pick", 0.4, False), ("arm_motions", 0.6, False)],
+)
+def test_the_arm_gives_way_above_a_stand_when_the_bridge_is_silent(name, age, yields):
+    flight = Flight(name, grasp_checks="off")
+    flight.until(lambda o: o.time > 8.0)
+    flight.readings = Readings(
+        mocap_age=0.01, joint_age=0.01, controller_age=0.01, autopilot_age=age
+    )
+    flight.state[0, 7] += 0.05  # the stand presses on it
+    output = flight.step(follow=False)
+    assert (output.reference[0, 7] == flight.state[0, 7]) == yields
+
+
 def test_a_flight_that_the_pilot_lands_is_over():
     flight = released()
     flight.state[0, 2] = START[2]

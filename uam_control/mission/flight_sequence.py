@@ -8,6 +8,7 @@ from collections import deque
 
 import numpy as np
 
+from uam_control.ages import SILENT
 from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.grasp import Grasp, GraspDecision
 from uam_control.maths.compiled import prepared
@@ -439,10 +440,11 @@ class Mission:
     def _give_way(self, stamp: float, seen: Observation) -> None:
         """Let the arm yield while the autopilot comes down by itself beside a payload's stand.
 
-        A stiff arm on the stand levers the vehicle over.
+        A stiff arm on the stand levers the vehicle over. A silent bridge sends no setpoints.
         """
         guidance, held = self._guidance, seen.authority
-        lands = held.lands and not held.landed and guidance is not None
+        lands = held.lands or seen.readings.autopilot_age > SILENT
+        lands = lands and not held.landed and guidance is not None
         flying = self.output.state is State.FLYING  # nobody has stopped it
         if not lands:
             if self._beside and flying:
