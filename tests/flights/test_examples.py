@@ -76,6 +76,11 @@ def test_an_estimator_of_ones_own_flies(tmp_path):
     assert 0.001 < max(x, y, z) < 0.03
 
 
+def test_a_gripper_of_ones_own_lifts_the_payload(tmp_path):
+    _, lifted, *_, place_error = run("own_gripper.py", tmp_path / "flown").split()
+    assert lifted == "True" and float(place_error) < 0.1
+
+
 def test_a_firmware_of_ones_own_is_spoken(tmp_path):
     assert run("own_firmware.py", tmp_path / "flown").split()[-1] == "True"
 

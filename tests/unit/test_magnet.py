@@ -27,11 +27,13 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import CONTROLS, Server
-from uam_sim_bridge.devices.magnet import gpio_line
-from uam_sim_bridge.devices.magnet.file_line import FileLine
-from uam_sim_bridge.devices.magnet.gpio_line import GpioLine, MagnetError
-from uam_sim_bridge.devices.magnet.magnet_driver import MagnetDriver
-from uam_sim_bridge.devices.magnet.switching import MagnetSwitching, SwitchingParameters
+from uam_sim_bridge.devices.magnet import lines
+from uam_sim_bridge.devices.magnet.lines import FileLine, GpioLine, MagnetError
+from uam_sim_bridge.devices.magnet.magnet_driver import (
+    MagnetDriver,
+    MagnetSwitching,
+    SwitchingParameters,
+)
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
@@ -267,7 +269,7 @@ def test_the_simulator_gets_the_actuators_in_the_last_six_controls():
 @given(st.lists(st.booleans(), max_size=20), st.booleans())
 def test_a_line_has_the_level_of_its_state(tmp_path_factory, states, active_low):
     file = tmp_path_factory.getbasetemp() / "line"
-    line = FileLine(file, active_low)
+    line = FileLine(str(file), active_low=active_low)
     assert line.read() is False and file.read_text() == ("1" if active_low else "0")
     for on in states:
         line.set(on)
@@ -277,7 +279,7 @@ def test_a_line_has_the_level_of_its_state(tmp_path_factory, states, active_low)
 
 def test_the_driver_switches_once_and_reads_back(tmp_path):
     file = tmp_path / "line"
-    driver = MagnetDriver(FileLine(file))
+    driver = MagnetDriver(FileLine(str(file)))
     for desired in (False, False, True, True):
         driver.update(desired)
         assert driver.state is desired and driver.problem == ""
@@ -292,6 +294,35 @@ def test_the_driver_switches_once_and_reads_back(tmp_path):
     driver.update(True)
     assert driver.state is None and driver.problem == "the line is lost: No such file or directory"
     driver.end(False)
+
+
+def test_a_line_of_ones_own_is_chosen_by_its_kind(monkeypatch, tmp_path):
+    class Relay(lines.Line):
+        def __init__(self, chip, number, active_low):
+            self.opened, self.on = (chip, number, active_low), False
+
+        def set(self, on):
+            self.on = on
+
+        def read(self):
+            return self.on
+
+        def close(self):
+            pass
+
+    monkeypatch.setitem(lines.LINES, "relay", Relay)
+    given = lines.LineParameters(chip="relay:/dev/ttyUSB3", line=2, active_low=True)
+    line = lines.open_line(given)
+    assert line.opened == ("/dev/ttyUSB3", 2, True)
+    driver = MagnetDriver(line)
+    driver.update(True)
+    assert driver.state is True and driver.switched == 1
+    driver.end(False)
+    assert line.on is False
+    simulated = lines.open_line(lines.LineParameters(chip=f"simulated:{tmp_path}/line"))
+    assert type(simulated) is FileLine
+    with pytest.raises(MagnetError, match="chip: /no/line: No such file or directory"):
+        lines.open_line(lines.LineParameters(chip="simulated:/no/line"))
 
 
 class Chip:
@@ -318,14 +349,14 @@ def test_gpiod_is_asked_for_an_output_that_is_off(monkeypatch):
         asked.update(device=device, consumer=consumer, **{"config": config})
         return chip
 
-    monkeypatch.setattr(gpio_line.gpiod, "request_lines", request)
+    monkeypatch.setattr(lines.gpiod, "request_lines", request)
     line = GpioLine("/dev/gpiochip4", 17, True)
     settings = asked["config"][17]
     assert asked["device"] == "/dev/gpiochip4" and asked["consumer"] == "uam magnet"
-    assert settings.direction is gpio_line.Direction.OUTPUT and settings.active_low
-    assert settings.output_value is gpio_line.Value.INACTIVE
+    assert settings.direction is lines.Direction.OUTPUT and settings.active_low
+    assert settings.output_value is lines.Value.INACTIVE
     line.set(True)
-    assert line.read() is True and chip.values == {17: gpio_line.Value.ACTIVE}
+    assert line.read() is True and chip.values == {17: lines.Value.ACTIVE}
     line.set(False)
     assert line.read() is False
     line.close()

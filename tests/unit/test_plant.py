@@ -178,3 +178,14 @@ def test_drag_and_wind_push_the_vehicle():
             plant.step(np.zeros(4), np.zeros(2), False)
     push = windy.truth().state[1, 0] - still.truth().state[1, 0]
     assert push == pytest.approx(0.15 * 3.0 / 2.2 * 0.4, rel=0.1)
+
+
+def test_another_gripper_has_the_force_of_its_curve():
+    """Full force up to 2 mm, none from 3 mm on, half of it between; the face above the plate."""
+    curve = [[0.0, 1.0], [0.002, 1.0], [0.003, 0.0]]
+    constants = magnet_constants(VEHICLE.compile(0.2), 0.003, curve)
+    np.testing.assert_allclose(constants, [*GAP, 0.0, 1.0, 0.002, 1.0, 0.003, 0.0])
+    upright = np.eye(3).ravel()
+    for gap, expected in ((0.0, 1.0), (0.0015, 1.0), (0.0025, 0.5), (0.003, 0.0), (1.0, 0.0)):
+        face = np.array([0.0, 0.0, 0.02 + gap])
+        assert pull_fraction(face, np.zeros(3), upright, constants) == pytest.approx(expected)

@@ -107,6 +107,10 @@ def test_what_the_model_is_made_of():
             "latency_ticks: 0, 1, 2, .. expected, got 1.5",
         ),
         ((("magnet", "holding_force"), "strong"), "magnet.holding_force: a number expected"),
+        ((("magnet", "curve"), [[0.0, 1.2]]), "magnet.curve: [[0.0, 1.2]]; allowed: [[gap in m,"),
+        ((("magnet", "curve"), [[0.1, 1.0], [0.0, 0.5]]), "by growing gaps"),
+        ((("magnet", "curve"), [0.1, 1.0]), "by growing gaps"),
+        ((("magnet", "curve"), "steep"), "magnet.curve: steep; allowed"),
     ],
 )
 def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):

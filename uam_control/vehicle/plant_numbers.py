@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from uam_control.settings.section import Section
 
 # entries that only the description and what is made of it read; a change of them has no effect
@@ -47,3 +49,18 @@ def check_plant_numbers(top: Section) -> None:
     magnet = top.section("magnet")
     magnet.positive("holding_force")
     magnet.positive("gap_scale")
+    if magnet.has("curve"):
+        check_curve(magnet)
+
+
+def check_curve(magnet: Section) -> None:
+    """Raise the section's error if `curve` is no list of [gap [m], fraction 0..1], by gap."""
+    curve = magnet.entry("curve")
+    try:
+        points = np.array(curve, dtype=float) if curve else np.zeros((0, 2))
+    except (TypeError, ValueError):
+        points = np.full((1, 2), np.nan)
+    usable = points.ndim == 2 and points.shape[1] == 2 and np.all(points >= 0.0)
+    if not usable or np.any(np.diff(points[:, 0]) <= 0.0) or np.any(points[:, 1] > 1.0):
+        allowed = "[[gap in m, fraction 0 to 1], ...] by growing gaps"
+        raise magnet.error("curve", f"{curve}; allowed: {allowed}")

@@ -11,7 +11,7 @@ from uam_control.offboard.autopilot_magnet import (
 )
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.node_parameters import NodeParameters
-from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
+from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 

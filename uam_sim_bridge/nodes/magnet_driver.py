@@ -6,21 +6,16 @@ For a magnet on an output of the autopilot see the parameter `magnet` of `mavlin
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
-from uam_control.settings.parameter_set import ParameterError
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_sim_bridge.devices.magnet.file_line import FileLine
-from uam_sim_bridge.devices.magnet.gpio_line import GpioLine, Line, MagnetError
-from uam_sim_bridge.devices.magnet.magnet_driver import LineParameters, MagnetDriver
-from uam_sim_bridge.devices.magnet.switching import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import LineParameters, MagnetError, open_line
+from uam_sim_bridge.devices.magnet.magnet_driver import MagnetDriver, SwitchingParameters
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 
 NAME = "magnet_driver"
-SIMULATED = "simulated:"  # chip: the rest is a file
 READ_PERIOD = 0.1  # [s] between two looks at the line without a command
 
 
@@ -34,9 +29,7 @@ class MagnetDriverNode(UamNode):
         line = NodeParameters(self, LineParameters, read_only=True).current
         switching = NodeParameters(self, SwitchingParameters, read_only=True).current
         self._topics = MagnetTopics(self, switching, time.monotonic)
-        self._line = LateDevice(
-            self, lambda: MagnetDriver(open_line(line)), (MagnetError, ParameterError)
-        )
+        self._line = LateDevice(self, lambda: MagnetDriver(open_line(line)), (MagnetError,))
         refuse_unknown(self)  # before the line is switched
         self._line.begin()
         self._chip = line.chip
@@ -76,18 +69,6 @@ class MagnetDriverNode(UamNode):
         if line is not None and line.device is not None:
             line.device.end(self._topics.switching.at_exit())
         super().destroy_node()
-
-
-def open_line(parameters: LineParameters) -> Line:
-    """Open the line, switched off; raises MagnetError, ParameterError."""
-    chip, inverted = parameters.chip, parameters.active_low
-    if not chip.startswith(SIMULATED):
-        return GpioLine(chip, parameters.line, inverted)
-    file = chip.removeprefix(SIMULATED)
-    try:
-        return FileLine(Path(file), inverted)
-    except OSError as error:
-        raise ParameterError(f"chip: {file}: {error.strerror or error}") from None
 
 
 def main() -> int:

@@ -141,8 +141,9 @@ class MujocoPlant(Plant):
         # of the same instant as the face: qpos is a physics step later
         self._payload_centre = data.xpos[self.model.body(PAYLOAD).id]
         self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
-        gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
-        self._magnet_constants = magnet_constants(self.model, gap_scale)
+        gripper = self.vehicle.numbers["magnet"]
+        curve = gripper.get("curve", ())
+        self._magnet_constants = magnet_constants(self.model, gripper["gap_scale"], curve)
         self._alpha[:] = arm_start
         self._swing_angle[:] = -sum(arm_start)
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]

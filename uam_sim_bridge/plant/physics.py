@@ -8,7 +8,6 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_sim_bridge.plant.actuators import joint_step, receive, rotor_step
-from uam_sim_bridge.plant.engine_step import mj_step
 from uam_sim_bridge.plant.magnet import pull_fraction
 
 
@@ -97,34 +96,6 @@ def average(a: PhysicsArrays, weight: float) -> None:
     """Add `weight` times the specific force of a physics step to its mean."""
     for i in range(3):
         a.specific_force[i] += weight * a.sensed_force[i]
-
-
-@jit
-def step_period(
-    a: PhysicsArrays,
-    commands: np.ndarray,
-    arm_command: np.ndarray,
-    magnet: bool,
-    gust: np.ndarray,
-    tick: int,
-    model: int,
-    data: int,
-    steps: int,
-) -> int:
-    """Advance control period `tick` by its `steps` physics steps.
-
-    commands (rotors,): 0..1; arm_command, magnet, gust: of `begin_period`; model, data: addresses
-    of MuJoCo's structures, to which `a` belongs. Returns 0, or an error as of `mj_step`: the state
-    is then undefined.
-    """
-    begin_period(a, arm_command, magnet, gust, tick)
-    for _ in range(steps):
-        actuate(a, commands)
-        error = mj_step(model, data)
-        if error:
-            return error
-        average(a, 1.0 / steps)
-    return 0
 
 
 @jit

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
+from uam_sim_bridge.plant.engine_step import mj_step
 from uam_sim_bridge.plant.observation import Observed, observe
-from uam_sim_bridge.plant.physics import PhysicsArrays, step_period
+from uam_sim_bridge.plant.physics import PhysicsArrays, actuate, average, begin_period
 from uam_sim_bridge.plant.plant import TruthRow
 from uam_sim_bridge.plant.sensors import (
     PAYLOAD_POSE,
@@ -76,12 +77,15 @@ def sense(a: PlantArrays, truth: np.ndarray) -> None:
 @borrowing
 def step(a: PlantArrays, motors: np.ndarray, arm_command: np.ndarray, magnet: bool) -> int:
     """Advance the physics by a period, as `MujocoPlant.step`; return 0 or an error's address."""
-    m = a.numbers[0]
+    m, physics = a.numbers[0], a.physics
+    model, data, steps = int(m.model_at), int(m.data_at), m.steps
     gust = a.gusts.rows[next_row(a.gusts) if m.gusty else 0]
-    error = step_period(
-        *(a.physics, motors, arm_command, magnet, gust, m.tick),
-        *(int(m.model_at), int(m.data_at), m.steps),
-    )
-    if not error:
-        m.tick += 1
-    return error
+    begin_period(physics, arm_command, magnet, gust, m.tick)
+    for _ in range(steps):
+        actuate(physics, motors)
+        error = mj_step(model, data)
+        if error:
+            return error
+        average(physics, 1.0 / steps)
+    m.tick += 1
+    return 0
