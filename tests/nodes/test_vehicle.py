@@ -20,7 +20,7 @@ from autopilot_on_a_line import AutopilotOnALine
 from uam_lab.flights.processes.process_table import nodes
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
 from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
 
 PATIENCE = 120.0  # [s]
@@ -110,7 +110,9 @@ def test_each_missing_device_is_named_and_used_once_it_is_there(laboratory, tmp_
         servos = [EmulatedServo(i + 1, one, baud_rate=BAUD) for i, one in enumerate(shafts)]
         opened.enter_context(contextlib.closing(EmulatedBus(servos, link=tmp_path / "ttyARM")))
         run.until("arm: present")
-        server = MocapServer([TrackedBody("uam")], lambda _: {"uam": (PLACE, LEVEL)}, port=port)
+        server = MocapServer(
+            [TrackedBody("uam")], lambda _: {"uam": (PLACE, LEVEL)}, Streaming(port=port)
+        )
         opened.enter_context(server)
         run.until("motion capture: present")
         autopilot = AutopilotOnALine(tmp_path / "ttyPX4")

@@ -23,7 +23,7 @@ from uam_sim_bridge.devices.mocap import driver as driver_module
 from uam_sim_bridge.devices.mocap import natnet_messages
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer, Streaming
 from uam_sim_bridge.devices.mocap.emulated.plant_poses import poses_of
 from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
@@ -59,8 +59,9 @@ def still(_):
     return {"uam": (POSITION, QUATERNION), "box": (np.zeros(3), np.array([1.0, 0, 0, 0]))}
 
 
-def serving(names=("uam", "box"), poses=still, **how):
-    return MocapServer([TrackedBody(name) for name in names], poses, **how)
+def serving(names=("uam", "box"), poses=still, disturbances=None, seed=0, **how):
+    bodies = [TrackedBody(name) for name in names]
+    return MocapServer(bodies, poses, Streaming(**how), disturbances, seed)
 
 
 @pytest.fixture

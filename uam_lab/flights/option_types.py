@@ -103,7 +103,7 @@ def _check_alike(name: str, value: Any, before: Any) -> None:
         expected = "" if _is_number(value) else "a number"
     elif isinstance(before, str):
         expected = "" if isinstance(value, str) else "a text"
-    elif isinstance(before, list) and all(map(_is_number, before)):
+    elif before and isinstance(before, list) and all(map(_is_number, before)):
         values = plain(value)
         fits = isinstance(values, list) and len(values) == len(before)
         expected = (

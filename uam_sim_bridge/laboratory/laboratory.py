@@ -23,7 +23,11 @@ from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
 from uam_sim_bridge.devices.dynamixel.emulated import ArmShafts, EmulatedBus, EmulatedServo
 from uam_sim_bridge.devices.dynamixel.startup import required_mode
 from uam_sim_bridge.devices.mocap.calibration import Calibration
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
+    Disturbances,
+    MocapServer,
+    Streaming,
+)
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.laboratory import hands
@@ -120,8 +124,8 @@ class Laboratory:
         self.cable = SerialCable(near, far, devices.baud, seed)
         self.mocap = MocapServer(
             mistaken_room(self._bodies(), self.wiring),
-            rate=1.0 / self.plant.period,  # the plant's own rate decides
-            port=devices.mocap_port,
+            # the plant's own rate decides
+            streaming=Streaming(rate=1.0 / self.plant.period, port=devices.mocap_port),
             disturbances=Disturbances(latency=max(0.0005, latency * self.plant.period)),
             seed=seed,
         )

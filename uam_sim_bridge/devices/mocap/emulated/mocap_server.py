@@ -49,6 +49,23 @@ class Disturbances:
     damage: float = 0.0
 
 
+@dataclass(frozen=True)
+class Streaming:
+    """How a server streams.
+
+    rate [Hz]; version: NatNet's; address: of the server; port, data_port: 0 for free ones; clock:
+    offset [s] and drift of the server's.
+    """
+
+    rate: float = 120.0
+    version: tuple[int, int] = (3, 1)
+    multicast: bool = False
+    address: str = "127.0.0.1"
+    port: int = 0
+    data_port: int = 0
+    clock: tuple[float, float] = (-1.7e9, 0.0)
+
+
 class MocapServer:
     """Serves in a thread of its own; `port`: the command port, `sent`: frames sent."""
 
@@ -56,37 +73,30 @@ class MocapServer:
         self,
         bodies: Sequence[TrackedBody],
         poses: Poses | None = None,
-        rate: float = 120.0,
-        version: tuple[int, int] = (3, 1),
-        multicast: bool = False,
-        address: str = "127.0.0.1",
-        port: int = 0,
-        data_port: int = 0,
-        clock: tuple[float, float] = (-1.7e9, 0.0),
+        streaming: Streaming | None = None,
         disturbances: Disturbances | None = None,
         seed: int = 0,
     ) -> None:
-        """rate [Hz]; port, data_port: 0 for free ones; clock: offset [s] and drift of the server's.
-
-        Raises OSError if a port is in use.
-        """
-        if version not in packets.VERSIONS:
-            raise ValueError(f"version {version}; allowed: {packets.VERSIONS}")
+        """seed: of the disturbances. Raises OSError if a port is in use."""
+        how = streaming or Streaming()
+        if how.version not in packets.VERSIONS:
+            raise ValueError(f"version {how.version}; allowed: {packets.VERSIONS}")
         self.disturbances = disturbances or Disturbances()
         self._bodies = dict(enumerate(bodies, 1))
         self._first = {n: body.name for n, body in self._bodies.items()}  # those of `poses`
-        self._poses, self._period, self._version = poses, 1.0 / rate, version
-        self._multicast, self._address = multicast, address
-        self._clock, self._random = clock, random.Random(seed)
+        self._poses, self._period, self._version = poses, 1.0 / how.rate, how.version
+        self._multicast, address = how.multicast, how.address
+        self._clock, self._random = how.clock, random.Random(seed)
         self._commands = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._commands.bind((address, port))
+        self._commands.bind((address, how.port))
         self.port = self._commands.getsockname()[1]
         self._outgoing = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._outgoing.bind((address, 0))
         self._outgoing.setsockopt(
             socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(address)
         )
-        self.data_port = data_port or (_free_port(address) if multicast else self.port + 1)
+        free = _free_port(address) if how.multicast else self.port + 1
+        self.data_port = how.data_port or free
         self._clients: dict[tuple[str, int], float] = {}  # address → time.monotonic() [s]
         self._lock = threading.Lock()
         self._hidden: set[str] = set()
