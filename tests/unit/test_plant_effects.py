@@ -18,9 +18,9 @@ from uam_sim_bridge.plant.effects.arm_occlusion import distance, seen_markers
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.downwash import momentum
 from uam_sim_bridge.plant.effects.ground_effect import raise_thrust, thrust_ratio
-from uam_sim_bridge.plant.effects.joint_gear import gear_step
+from uam_sim_bridge.plant.effects.joint_gear import Gear, gear_step
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
-from uam_sim_bridge.plant.effects.propeller_vibration import mean_of_wave, vibrated
+from uam_sim_bridge.plant.effects.propeller_vibration import Shaken, mean_of_wave, vibrated
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -166,10 +166,11 @@ def test_the_mean_of_a_wave_over_whole_turns_is_zero_and_over_none_its_value():
 def test_an_unbalanced_rotor_shakes_the_imu_by_hand():
     # 500 rad/s for 4 ms: 2 rad; mean of cos: sin(2)/2 = 0.45465, of sin: (1 - cos 2)/2 = 0.70807
     zero, phases = np.zeros(3), np.zeros(1)
-    gyro, force = vibrated(
-        zero, zero, np.array([500.0]), np.ones(1), np.array([[0.0, 0.0, 0.05]]), phases,
+    shaken = Shaken(
+        np.ones(1), np.array([[0.0, 0.0, 0.05]]), phases,
         np.array([1e-6]), 0.0, 1.0 / 2.0, np.full(3, 1.0 / 0.02), 0.004,
     )  # fmt: skip
+    gyro, force = vibrated(zero, zero, np.array([500.0]), shaken)
     push = 1e-6 * 500.0**2  # 0.25 N
     assert force == pytest.approx([0.45465 * push / 2, 0.70807 * push / 2, 0.0], abs=1e-6)
     # torque 0.05 m x F about y from the x force, about -x from the y force; integrated: / omega
@@ -269,10 +270,8 @@ def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0):
     """One step of a gear of 0.02 rad half play, 100 N m/rad; return contact, angle, speed."""
     constants = np.array([0.02, 100.0, 0.0, 1.5, 0.05, 0.002])
     angles, speeds, output = np.array([angle]), np.array([speed]), np.zeros(1)
-    gear_step(
-        np.array([torque]), np.array([alpha]), np.array([alpha_dot]), np.array([0.01]),
-        np.array([friction]), constants, angles, speeds, output,
-    )  # fmt: skip
+    motors = Gear(np.array([0.01]), np.array([friction]), constants, angles, speeds)
+    gear_step(motors, np.array([torque]), np.array([alpha]), np.array([alpha_dot]), output)
     return output[0], angles[0], speeds[0]
 
 
@@ -295,7 +294,7 @@ def test_a_joint_with_play_swings_freely_within_it():
         one.sense()
         one.step(np.zeros(4), np.array([0.0, 0.0]), False)
     gear_ = one._effects.gears[0]
-    assert np.all(np.abs(gear_._angle - one._alpha) <= math.radians(1.0) + 0.01)
+    assert np.all(np.abs(gear_.motors.angle - one._alpha) <= math.radians(1.0) + 0.01)
 
 
 def test_cables_pull_to_their_rest_angle():

@@ -15,7 +15,7 @@ output shaft, so that it measures the link.
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class _Gear(Acting):
         start = model.jnt_qposadr[first]
         self._alpha = data.qpos[start : start + bench.arm[1]]
         self._alpha_dot = data.qvel[dofs]
-        self._constants = np.array(
+        constants = np.array(
             [
                 0.5 * math.radians(p.backlash_deg),
                 p.stiffness,
@@ -61,46 +61,42 @@ class _Gear(Acting):
                 model.opt.timestep,
             ]
         )
-        self._inertia = model.dof_armature[dofs].copy()
-        self._friction = model.dof_frictionloss[dofs].copy()
+        own = model.dof_armature[dofs].copy(), model.dof_frictionloss[dofs].copy()
         model.dof_armature[dofs] = LINK_ARMATURE
         model.dof_frictionloss[dofs] = 0.0
-        self._angle, self._speed = self._alpha.copy(), np.zeros(bench.arm[1])
+        self.motors = Gear(*own, constants, self._alpha.copy(), np.zeros(bench.arm[1]))
 
     def joints(self) -> None:
         bench = self._bench
         gear_step(
-            bench.servo_torque,
-            self._alpha,
-            self._alpha_dot,
-            self._inertia,
-            self._friction,
-            self._constants,
-            self._angle,
-            self._speed,
-            bench.torque_control,
+            self.motors, bench.servo_torque, self._alpha, self._alpha_dot, bench.torque_control
         )
+
+
+class Gear(NamedTuple):
+    """The motors behind the gears of n joints.
+
+    inertia (n,) [kg m^2], friction (n,) [N m]; constants (6,): half backlash [rad], stiffness
+    [N m/rad], damping [N m s/rad], stiction [1], Stribeck speed [rad/s], step [s]; their state:
+    angle (n,) [rad], speed (n,) [rad/s].
+    """
+
+    inertia: np.ndarray
+    friction: np.ndarray
+    constants: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
 
 
 @jit
 def gear_step(
-    torque: np.ndarray,
-    alpha: np.ndarray,
-    alpha_dot: np.ndarray,
-    inertia: np.ndarray,
-    friction: np.ndarray,
-    constants: np.ndarray,
-    angle: np.ndarray,
-    speed: np.ndarray,
-    output: np.ndarray,
+    gear: Gear, torque: np.ndarray, alpha: np.ndarray, alpha_dot: np.ndarray, output: np.ndarray
 ) -> None:
     """Advance the motors by one physics step; write the torque on the links to output (n,) [N m].
 
-    torque (n,) [N m] of the servos; alpha, alpha_dot (n,) of the links; inertia (n,) [kg m^2],
-    friction (n,) [N m] of the motors; constants (6,): half backlash [rad], stiffness [N m/rad],
-    damping [N m s/rad], stiction [1], Stribeck speed [rad/s], step [s]; angle [rad], speed [rad/s]
-    (n,) of the motors, overwritten.
+    torque (n,) [N m] of the servos; alpha, alpha_dot (n,) of the links.
     """
+    inertia, friction, constants, angle, speed = gear
     half, stiffness, damping, stiction, slow, step = constants
     for i in range(len(torque)):
         gap = angle[i] - alpha[i]

@@ -10,7 +10,7 @@ integrates its IMU (IMU_INTEG_RATE): the harmonics above half the sample rate do
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -44,27 +44,39 @@ class _Vibration(Acting):
         self, p: PropellerVibration, bench: Bench, imbalance: np.ndarray, phases: np.ndarray
     ) -> None:
         model, base = bench.model, bench.model.body("base").id
-        self._mass = p.frame_gain / float(model.body_subtreemass[base])
-        self._inertia = p.frame_gain / model.body_inertia[base]
-        self._imbalance, self._phases = imbalance, phases
-        self._blade = p.blade_passing * bench.vehicle.description.rotor.thrust_coefficient
-        self._bench = bench
-
-    def imu(self, gyro: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        bench = self._bench
-        return vibrated(
-            gyro,
-            force,
-            bench.rotors.speed,
+        self._rotors = bench.rotors
+        self._shaken = Shaken(
             bench.directions,
             bench.positions,
-            self._phases,
-            self._imbalance,
-            self._blade,
-            self._mass,
-            self._inertia,
+            phases,
+            imbalance,
+            p.blade_passing * bench.vehicle.description.rotor.thrust_coefficient,
+            p.frame_gain / float(model.body_subtreemass[base]),
+            p.frame_gain / model.body_inertia[base],
             bench.period,
         )
+
+    def imu(self, gyro: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return vibrated(gyro, force, self._rotors.speed, self._shaken)
+
+
+class Shaken(NamedTuple):
+    """Rotors and frame.
+
+    directions (rotors,): 1 counter-clockwise; positions (rotors, 3) [m, FLU]; phases (rotors,)
+    [rad]: their state; imbalance (rotors,) [kg m]; blade [N s^2/rad^2]: amplitude of the thrust /
+    speed^2; mass: frame gain / mass [1/kg]; inertia (3,): frame gain / inertia [1/(kg m^2)]; period
+    [s]: of a sample.
+    """
+
+    directions: np.ndarray
+    positions: np.ndarray
+    phases: np.ndarray
+    imbalance: np.ndarray
+    blade: float
+    mass: float
+    inertia: np.ndarray
+    period: float
 
 
 @jit
@@ -79,25 +91,13 @@ def mean_of_wave(phase: float, angle: float) -> tuple[float, float]:
 
 @jit
 def vibrated(
-    gyro: np.ndarray,
-    force: np.ndarray,
-    speed: np.ndarray,
-    directions: np.ndarray,
-    positions: np.ndarray,
-    phases: np.ndarray,
-    imbalance: np.ndarray,
-    blade: float,
-    mass: float,
-    inertia: np.ndarray,
-    period: float,
+    gyro: np.ndarray, force: np.ndarray, speed: np.ndarray, shaken: Shaken
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU, with the vibration.
 
-    speed (rotors,) [rad/s]; directions (rotors,): 1 counter-clockwise; positions (rotors, 3)
-    [m, FLU]; phases (rotors,) [rad], advanced by one period [s]; imbalance (rotors,) [kg m];
-    blade [N s^2/rad^2]: amplitude of the thrust / speed^2; mass: frame gain / mass [1/kg]; inertia
-    (3,): frame gain / inertia [1/(kg m^2)].
+    speed (rotors,) [rad/s]. The phases advance by one period.
     """
+    directions, positions, phases, imbalance, blade, mass, inertia, period = shaken
     rates, acceleration = gyro.copy(), force.copy()
     for i in range(len(speed)):
         omega = speed[i]
