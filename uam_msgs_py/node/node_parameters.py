@@ -170,9 +170,10 @@ def refuse_unknown(node: Node, shown: str = "") -> None:
     """
     prefix = f"{shown}: " if shown else ""
     own = ("use_sim_time", "qos_overrides.", "start_type_description_service")
-    for name in node._parameter_overrides:
+    for name in given(node):
         if node.has_parameter(name) or name.startswith(own):
             continue
         if name not in shared_section():  # it reads the files: only for a name in question
-            known = sorted(name for name in node._parameters if not name.startswith(own))
+            declared = node.get_parameters_by_prefix("")
+            known = sorted(name for name in declared if not name.startswith(own))
             raise ParameterError(f"{prefix}{name}: {unknown(name, known)}")
