@@ -75,10 +75,13 @@ def test_a_parameter_of_every_node_may_be_unknown_to_one(tmp_path, monkeypatch):
     file = tmp_path / "parameters.yaml"
     file.write_text("/**: {ros__parameters: {vehicle: s500_arm}}")
     monkeypatch.setattr(sys, "argv", ["recorder", "--ros-args", "--params-file", str(file)])
+    given = {"vehicle": SimpleNamespace(value="s500_arm")}
     node = SimpleNamespace(
-        _parameter_overrides={"vehicle": 0}, _parameters={}, has_parameter=lambda _: False
+        _parameter_overrides=given,
+        has_parameter=lambda _: False,
+        get_parameters_by_prefix=lambda _: {},
     )
     refuse_unknown(node)
-    node._parameter_overrides["vehicles"] = 0
+    given["vehicles"] = given["vehicle"]
     with pytest.raises(ValueError, match="vehicles: unknown"):
         refuse_unknown(node)
