@@ -77,6 +77,14 @@ class Firmware:
         numbers = main << 16 | sub << 24, main
         return next((self.mode(one) for one in numbers if one in self._named), Mode.UNKNOWN)
 
+    def file(self, name: str) -> Path:
+        """Return the file `name`.yaml of this firmware; raises ConfigurationError without one."""
+        found, place = self.folder / f"{name}.yaml", self.folder.name
+        if not found.is_file():
+            there = ", ".join(sorted(file.name for file in self.folder.glob("*.yaml")))
+            raise ConfigurationError(f"no {place}/{name}.yaml; {place}/ has: {there}")
+        return found
+
     def table(self, name: str) -> Any:
         """Return the content of the file `name`.yaml of this firmware, {} without one."""
         file = self.folder / f"{name}.yaml"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import yaml_file
 from uam_control.settings.configuration import ConfigurationError
 
 VEHICLE = "vehicle"  # name of the list for a real vehicle
@@ -96,9 +96,7 @@ class RequiredParameters(dict[str, Rule]):
 
         Raises ConfigurationError in one line: file, parameter, what is allowed.
         """
-        file = Path(given)
-        if not file.suffix:
-            file = configuration.path(str(spoken.folder / f"{given}.yaml"))
+        file = Path(given) if Path(given).suffix else spoken.file(given)
         sections = yaml_file.read(file, ConfigurationError)
         if not isinstance(sections, dict):
             raise ConfigurationError(f"{file}: sections of 'NAME: {{rule, why}}' lines expected")
