@@ -27,6 +27,7 @@ from uam_msgs_py.node.rightful import rightful_nodes
 
 NAME = "cockpit"
 OPTIONS = "views/cockpit.yaml"
+ASKED_WITHIN = 0.8  # [s] every page asks for the state once: watching.html.j2
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,8 @@ def main() -> int:
         page.spare(rate.sparing)
         while (left := end - time.monotonic()) > 0.0 and not stop.raised:
             executor.spin_once(timeout_sec=left)
+    if page.end():
+        time.sleep(ASKED_WITHIN)
     server.stop()
     watcher.destroy_node()
     node.destroy_node()

@@ -122,6 +122,12 @@ class Page:
                 self._services.offer(topics.GOAL_POSE)
             self._find_nodes()
 
+    def end(self) -> bool:
+        """Show the last messages; return whether they end the flight: pages must still ask once."""
+        self._watch.look(self._take)
+        self._update_headline()
+        return self._over
+
     def say(self, done: bool, text: str) -> None:
         """Add a line to the answers; a failure is also shown as a notification."""
         self._lines.appendleft(text)
@@ -130,15 +136,18 @@ class Page:
             for client in self._server.get_clients().values():
                 client.add_notification("Refused", text, auto_close_seconds=8.0, color="red")
 
+    @property
+    def _over(self) -> bool:
+        mission = self._health.mission
+        return mission is not None and mission.done
+
     def _update_headline(self) -> None:
         self._health.silence = self._watch.silence
         self._health.refused = self._watch.door.refusals.count
         found = headline(self._health, self._options)
         if found != self._shown:
             self._headline.content = self._shown = found
-        mission = self._health.mission
-        over = mission is not None and mission.done
-        self._plain.show(found, list(self._lines), over, self._commands)
+        self._plain.show(found, list(self._lines), self._over, self._commands)
         self._buttons.look()
 
     def _take(self, topic: Topic, message: Any) -> None:
