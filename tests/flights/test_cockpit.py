@@ -182,7 +182,8 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
         connect(url, origin="http://elsewhere.example", subprotocols=["viser-v0"])
 
     page.get_by_role("button", name="Land").click()
-    for text in ("The flight is over", "LANDED", "report.html"):
+    expect(page.get_by_role("heading", name="The flight is over")).to_be_in_viewport()
+    for text in ("FLIGHT OVER", "report.html"):
         expect(page.get_by_role("alert")).to_contain_text(text)
 
 
