@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from uam_control.settings.process_parameters import ProcessParameters
-from uam_lab.flights.flight_settings import AUTOPILOT, BUILTIN
+from uam_lab.flights.flight_options import BUILTIN
+from uam_lab.flights.flight_settings import AUTOPILOT
 from uam_lab.flights.ros.placement import NICE, pair, placing
 from uam_msgs_py.node import wiring
 

@@ -19,7 +19,8 @@ from uam_lab.experiments.study.flights import StudyFlight
 from uam_lab.experiments.trials import trial
 from uam_lab.experiments.trials.trial import Trial, TrialFailed
 from uam_lab.flights.direct.flight import DirectFlight
-from uam_lab.flights.flight_settings import LAST_SEED, SettingsError, settings
+from uam_lab.flights.flight_options import LAST_SEED
+from uam_lab.flights.flight_settings import SettingsError, settings
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.timeseries import FlightTable
 

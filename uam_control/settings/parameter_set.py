@@ -6,8 +6,10 @@ its value and the allowed range. The ROS nodes declare their parameters from the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from numbers import Integral
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -56,7 +58,7 @@ class Choice:
     """Meaning of a parameter that is one of several words; `fixed`: read-only in a running node."""
 
     description: str
-    choices: tuple[str, ...]
+    choices: Collection[str]
     fixed: bool = False
 
 
@@ -70,23 +72,33 @@ class Switch:
 @dataclass(frozen=True)
 class Text:
     """Meaning of a parameter that is a text; allowed: its form, for the user; a secret one is
-    never shown."""
+    never shown. file: a path is allowed, too; several: a list of texts, one text is a list of one.
+    """
 
     description: str
     allowed: str
     secret: bool = False
+    file: bool = False
+    several: bool = False
 
 
-Spec = Bound | Choice | Switch | Text
+@dataclass(frozen=True)
+class Entries:
+    """Meaning of a parameter that is a mapping, which its user checks."""
+
+    description: str
 
 
-def integer(default: int, description: str, low: int, high: int) -> Any:
+Spec = Bound | Choice | Switch | Text | Entries
+
+
+def integer(default: int | None, description: str, low: int, high: int) -> Any:
     """Declare a field that is one integer within [low, high]."""
     spec = Bound(description, "", low, high, whole=True)
     return field(default=default, metadata={"spec": spec})
 
 
-def number(default: float, description: str, unit: str, low: float, high: float) -> Any:
+def number(default: float | None, description: str, unit: str, low: float, high: float) -> Any:
     """Declare a field that is one number within [low, high]."""
     return field(default=default, metadata={"spec": Bound(description, unit, low, high)})
 
@@ -109,7 +121,9 @@ def vector(
     return field(default=default, metadata={"spec": spec})
 
 
-def choice(default: str, description: str, choices: tuple[str, ...], fixed: bool = False) -> Any:
+def choice(
+    default: str | None, description: str, choices: Collection[str], fixed: bool = False
+) -> Any:
     """Declare a field that is one of `choices`; `fixed`: read-only in a running node."""
     return field(default=default, metadata={"spec": Choice(description, choices, fixed)})
 
@@ -124,9 +138,25 @@ def text(default: str, description: str, allowed: str, secret: bool = False) -> 
     return field(default=default, metadata={"spec": Text(description, allowed, secret)})
 
 
+def name_or_file(default: str | None, description: str, allowed: str) -> Any:
+    """Declare a field that is a text or a path, see `Text`."""
+    return field(default=default, metadata={"spec": Text(description, allowed, file=True)})
+
+
+def texts(description: str, allowed: str, file: bool = False) -> Any:
+    """Declare a field that is a list of texts, see `Text`, by default an empty one."""
+    spec = Text(description, allowed, file=file, several=True)
+    return field(default=(), metadata={"spec": spec})
+
+
+def entries(description: str) -> Any:
+    """Declare a field that is a mapping, by default an empty one."""
+    return field(default_factory=dict, metadata={"spec": Entries(description)})
+
+
 @dataclass(frozen=True)
 class ParameterSet:
-    """Base of every parameter set."""
+    """Base of every parameter set. A field whose default is None may be None: not given."""
 
     @classmethod
     def specs(cls) -> dict[str, Spec]:
@@ -167,19 +197,22 @@ class ParameterSet:
         clean = {}
         for name, spec in self.specs().items():
             value = getattr(self, name)
+            if value is None and getattr(type(self), name, ...) is None:
+                continue
             if isinstance(spec, Bound):
                 if spec.length == 0 and value is getattr(type(self), name):
                     value = axes * value  # the default, repeated for every axis
                 if isinstance(value, tuple) and not value:
                     _check_not_required(name, spec, axes)
                 clean[name] = _number(name, value, spec, axes)
-            elif isinstance(spec, Choice) and value not in spec.choices:
+            elif isinstance(spec, Choice) and value not in tuple(spec.choices):
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
             elif isinstance(spec, Switch) and not isinstance(value, bool):
                 raise ParameterError(f"{name}: {value!r} is not true or false")
-            elif isinstance(spec, Text) and not isinstance(value, str):
-                what = "the value" if spec.secret else repr(value)
-                raise ParameterError(f"{name}: {what} is no text; allowed: {spec.allowed}")
+            elif isinstance(spec, Text):
+                clean[name] = _text(name, value, spec)
+            elif isinstance(spec, Entries) and not isinstance(value, Mapping):
+                raise ParameterError(f"{name}: name → value expected, got {value!r}")
         checked = replace(self, **clean)
         checked.check_together()
         return checked
@@ -195,14 +228,25 @@ def _check_not_required(name: str, spec: Bound, axes: int) -> None:
         raise MissingParameter(f"{name} is missing: {count} numbers, each {spec.allowed}")
 
 
+def _text(name: str, value: Any, spec: Text) -> Any:
+    """Return a text; where several are allowed, a tuple of them."""
+    several = spec.several and isinstance(value, Iterable) and not isinstance(value, str)
+    found = tuple(value) if several else (value,)
+    for one in found:
+        if not isinstance(one, str | Path if spec.file else str):
+            what = "the value" if spec.secret else repr(one)
+            raise ParameterError(f"{name}: {what} is no text; allowed: {spec.allowed}")
+    return found if spec.several else value
+
+
 def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
     allowed = spec.allowed
     if spec.whole:
-        if isinstance(value, bool) or not isinstance(value, int):
+        if isinstance(value, bool) or not isinstance(value, Integral):
             raise ParameterError(f"{name}: {value!r} is no integer; allowed: {allowed}")
         if not spec.low <= value <= spec.high:
             raise ParameterError(f"{name}: {value} is outside {allowed}")
-        return value
+        return int(value)
     if spec.optional and not np.size(value):
         return ()
     try:

@@ -13,7 +13,8 @@ from uam_lab.experiments.budget.path import NoTicks
 from uam_lab.experiments.budget.shuttle import JOINTS, shuttle
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_settings import CLOCKS, FlightSettings, require_ros
+from uam_lab.flights.flight_options import CLOCKS
+from uam_lab.flights.flight_settings import FlightSettings, require_ros
 from uam_lab.flights.library.flight_result import FlightFailed
 from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.flights.progress import Progress

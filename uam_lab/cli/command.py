@@ -14,14 +14,22 @@ from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import Profile, ProfileError, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.parameter_set import (
+    Bound,
+    Choice,
+    ParameterError,
+    ParameterSet,
+    Switch,
+    Text,
+)
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.experiments.campaign.variations import VariationError
 from uam_lab.experiments.study.description import StudyError
 from uam_lab.experiments.trials.trial import TrialFailed
 from uam_lab.experiments.tuning.space import TuningError
 from uam_lab.experiments.workers.place import WorkersError, Workplace, cores
-from uam_lab.flights.flight_settings import LAST_SEED, SettingsError
+from uam_lab.flights.flight_options import LAST_SEED
+from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import FOLDER, TEMPLATE
 from uam_lab.records.recording.mcap_reader import UnreadableLog
@@ -94,6 +102,30 @@ class Command:
     def choice(self, flag: str, choices: tuple[str, ...], default: str, text: str) -> None:
         """Add an option whose value is one of `choices`."""
         self.option(flag, "|".join(choices), text, default, choices=choices)
+
+    def described(self, kind: type[ParameterSet], names: str, **metavars: str) -> None:
+        """Add options for parameters of a set; names: of the parameters, in order.
+
+        metavars: parameter → its unit in other words. A list of texts is an option that may be
+        repeated, in the singular.
+        """
+        default = kind()
+        for name in names.split():
+            spec = kind.specs()[name]
+            usual, flag = getattr(default, name), f"--{name.replace('_', '-')}"
+            if isinstance(spec, Switch):
+                self.switch(flag, spec.description)
+            elif isinstance(spec, Text) and spec.several:
+                flag = flag.removesuffix("s")
+                self.repeated(flag, spec.allowed, spec.description, dest=name)
+            elif isinstance(spec, Bound):
+                what = number(name.replace("_", " "), spec.unit, spec.low, spec.high)
+                metavar = metavars.get(name, spec.unit.upper().replace("^", "") or "N")
+                kind_of = int if spec.whole else what
+                self.option(flag, metavar, spec.description, usual, type=kind_of)
+            else:
+                words = "|".join(spec.choices) if isinstance(spec, Choice) else spec.allowed
+                self.option(flag, metavars.get(name, words), spec.description, usual)
 
     def vehicle(self, others: str = "") -> None:
         """Add --vehicle; others: who else names one, "the lab file's", None is the default then."""

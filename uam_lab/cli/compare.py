@@ -23,7 +23,8 @@ from uam_lab.cli.command import (
 from uam_lab.experiments.compare import plan
 from uam_lab.experiments.trials.trial import TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_settings import ENGINES, require_ros
+from uam_lab.flights.flight_options import ENGINES
+from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX

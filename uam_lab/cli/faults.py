@@ -20,7 +20,8 @@ from uam_lab.cli.command import (
     refuse_given,
 )
 from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
+from uam_lab.flights.flight_options import CLOCKS, ENGINES, check_clock
+from uam_lab.flights.flight_settings import require_ros
 from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.flights.vehicle.lab_settings import settings_of
 from uam_lab.records.results.result_folder import make_folder

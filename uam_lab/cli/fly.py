@@ -11,7 +11,8 @@ from uam_control.settings import configuration
 from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
+from uam_lab.flights.flight_options import FlightOptions
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.library.flight import Engine, Flight
 from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
 from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
@@ -19,10 +20,6 @@ from uam_lab.flights.progress import Progress
 from uam_lab.records.results.terminal import Terminal, say
 from uam_lab.report.page.console import reporting, summary
 from uam_sim_bridge.faults.schedule import late
-from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
-from uam_sim_bridge.mavlink.transport.transport import ALLOWED
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
-from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
 
 COMPLETED, NOT_COMPLETED = 0, 1
 EXAMPLES = """\
@@ -80,55 +77,15 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--profile", "NAME|FILE", text, action="append")
     command.vehicle()
     command.scenario()
-    text = "after a trajectory: to the take-off point, or down where it ends (default: its own)"
-    option("--end", "return|land", text)
-    command.switch(
-        "--retime", "slow a scenario that exceeds a limit of the vehicle down until it does not"
+    command.described(
+        FlightOptions,
+        "end retime transit_speed transit_acceleration engine fused inner_rate clock imu plant",
     )
-    text = "largest speed on the way to a trajectory and back (default 1)"
-    option("--transit-speed", "M/S", text, type=number("speed", "m/s", 0.05, 5.0))
-    text = "largest acceleration there (default 1)"
-    option("--transit-acceleration", "M/S2", text, type=number("acceleration", "m/s^2", 0.05, 5.0))
-    option("--engine", "ros|direct", "nodes and sockets, or one loop without them", "ros")
-    command.switch(
-        "--fused",
-        "estimator, mission, controllers and bridge as one process, for few cores: "
-        "docs/architecture.md",
-    )
-    text = "with --fused: messages per second sent of the topics within it (default: all)"
-    option("--inner-rate", "HZ", text, type=number("rate", "Hz", 0.0, 1000.0))
-    text = "simulated time, repeatable for the same seed; or the wall clock"
-    option("--clock", "lockstep|realtime", text, "lockstep")
-    text = "IMU of the estimator: the companion's, or the autopilot's over MAVLink"
-    option("--imu", "topic|autopilot", text, "topic")
-    text = f"physics engine: {', '.join(PLANTS)}, or a class of your own"
-    option("--plant", "NAME|MODULE:CLASS", text, DEFAULT_PLANT)
     command.plant()
-    text = (
-        "the stand-in; PX4 in software; or the link of an autopilot that you started: "
-        f"{ALLOWED}; serial: a flight controller in HITL mode"
+    command.described(
+        FlightOptions,
+        "autopilot px4_dir px4_params arm dry_run sim_address gcs payload_mass",
     )
-    option("--autopilot", "builtin|px4|URL", text, "builtin")
-    text = "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)"
-    option("--px4-dir", "DIR", text)
-    command.repeated(
-        "--px4-param",
-        "NAME=VALUE",
-        "a parameter of PX4 in software, in place of config/'s; with --autopilot px4",
-        dest="px4_params",
-    )
-    command.switch(
-        "--arm", "arm and take off by itself also with a real autopilot (serial, another host)"
-    )
-    command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
-    text = (
-        "address of this machine at which the simulator waits for an autopilot that you start; "
-        "0.0.0.0: also from other machines, which is not secure"
-    )
-    option("--sim-address", "ADDRESS", text, HOST)
-    option("--gcs", "URL", "ground station, as udp:127.0.0.1:14550 (default: none)", "")
-    mass = number("mass", "kg", 0.0)
-    option("--payload-mass", "KG", "default: the scenario's", type=mass)
     wind = number("wind", "m/s")
     option("--wind", ("X", "Y", "Z"), "mean wind [m/s, ENU] (default: calm)", type=wind, nargs=3)
     text = "standard deviation of the gusts per axis (default: none)"
@@ -144,41 +101,17 @@ def add(commands: argparse._SubParsersAction) -> None:
         text = "largest further delay of each message, uniform"
         option(f"--{what}-jitter", "MS", text, 0.0, type=milliseconds)
     command.seed("of all noise")
-    command.repeated(
-        "--without",
-        "NODE[=NAME]",
-        "do not start this node, wait for yours of that name, or of NAME: "
-        f"{', '.join(REPLACEABLE)}; "
-        f"or do not start a display: {', '.join(ONLOOKERS)}",
-    )
-    command.switch(
-        "--view", "serve the cockpit, a local web page: the scene, charts, gains, commands"
-    )
-    command.repeated(
-        "--fault",
-        "SPEC|FILE",
-        "inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
-        ":parameter=value,...; or a YAML file with several faults; uam faults --list shows all",
-        dest="faults",
-    )
+    command.described(FlightOptions, "without view faults")
     command.out("<scenario>-<controller>")
-    text = "size at which log.mcap ends, after hours; the flight continues"
-    option("--log-limit", "MB", text, LOG_LIMIT, type=number("size", "MB", 1.0))
+    command.described(FlightOptions, "log_limit")
     command.switch(
         "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
     )
     text = "leave out the report with its video; uam report makes it later"
     command.switch("--no-report", text, "store_false", dest="report")
-    text = (
-        f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
-        "(default: the first free one)"
-    )
-    option("--instance", "N", text, type=int)
+    command.described(FlightOptions, "instance")
     command.process()
-    text = "namespace of all nodes, for several vehicles in one ROS domain (default: none)"
-    option("--namespace", "NAME", text, "")
-    text = f"ROS domain, 0..{LAST_DOMAIN} (default: that of the instance)"
-    option("--domain", "N", text, type=int)
+    command.described(FlightOptions, "namespace domain")
 
 
 def run(options: argparse.Namespace) -> int:

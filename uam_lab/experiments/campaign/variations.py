@@ -13,7 +13,7 @@ from uam_control.profiles.profile import Profile
 from uam_control.settings.configuration import path
 from uam_control.settings.section import read_section
 from uam_lab.experiments.trials.trial import Trial
-from uam_lab.flights.flight_settings import LAST_SEED
+from uam_lab.flights.flight_options import LAST_SEED
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects

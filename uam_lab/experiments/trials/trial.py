@@ -19,7 +19,8 @@ from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify, explai
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.direct.warm_up import prepare
-from uam_lab.flights.flight_settings import ONLOOKERS, FlightSettings
+from uam_lab.flights.flight_options import ONLOOKERS
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.records.results import metrics

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import inspect
 import math
 import shlex
 import sys
@@ -56,14 +55,10 @@ class Flight:
     """
 
     def __init__(self, *, observer: Observer | None = None, **options: Any) -> None:
-        """options: see `uam_lab.flights.flight_settings.settings`; observer: receives the progress.
+        """options: see `uam_lab.flights.flight_options.FlightOptions`; observer: for the progress.
 
         Raises SettingsError and the errors named there; nothing is started yet.
         """
-        known = inspect.signature(flight_settings.settings).parameters
-        for name in options:
-            if name not in known:
-                raise SettingsError(f"unknown option '{name}'; there are: {', '.join(known)}")
         if observer is not None and not isinstance(observer, Observer):
             raise SettingsError(f"observer: an Observer expected, got {observer!r}")
         options.setdefault("command", shlex.join(["python", *sys.argv]))

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
-from uam_lab.flights.flight_settings import AUTOPILOT, ONLOOKERS, FlightSettings
+from uam_lab.flights.flight_options import ONLOOKERS
+from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flights.observer import FlightStatus, Observer
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.processes import NodeFailed, Processes

@@ -13,7 +13,8 @@ from uam_control.profiles.profile import servo_mode
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.cockpit import page_address
 from uam_lab.flights.conclude import settings_facts
-from uam_lab.flights.flight_settings import AUTOPILOT_IMU, BUILTIN, FlightSettings
+from uam_lab.flights.flight_options import AUTOPILOT_IMU, BUILTIN
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.node_options import EVERY_NODE
 from uam_lab.records.recording import log_facts
 from uam_lab.records.results.result_folder import PX4_LOG, ResultFolder, as_json, versions

@@ -13,7 +13,8 @@ import contextlib
 import os
 from collections.abc import Callable, Sequence
 
-from uam_lab.flights.flight_settings import AUTOPILOT, BUILTIN, ONLOOKERS, FlightSettings
+from uam_lab.flights.flight_options import BUILTIN, ONLOOKERS
+from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_msgs_py.node import wiring
 
 FIRST_CORE = {

@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterator
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
-from uam_lab.flights.flight_settings import COCKPIT, FlightSettings
+from uam_lab.flights.flight_options import COCKPIT
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest

@@ -7,7 +7,8 @@ from typing import Any
 from uam_control.offboard.autopilot_magnet import NONE
 from uam_control.vehicle import POSITION_SERVO
 from uam_lab.cockpit import page_address
-from uam_lab.flights.flight_settings import ONLOOKERS, FlightSettings
+from uam_lab.flights.flight_options import ONLOOKERS
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros import node_arguments
 from uam_lab.flights.vehicle.lab import AUTOPILOT, GPIO, Lab
 from uam_lab.records.results.result_folder import ResultFolder

@@ -1,12 +1,11 @@
-"""Checks of the types of a flight's options, which a program may give."""
+"""Changes of a vehicle's numbers for one flight, checked."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
-from numbers import Integral, Real
-from pathlib import Path
+from numbers import Real
 from typing import Any
 
 from uam_control.settings.section import Section
@@ -18,46 +17,12 @@ EFFECTS = "effects"  # of the plant, beside the numbers of a vehicle
 WHERE = "vehicle_changes:"
 
 
-def texts(name: str, given: str | Iterable[str]) -> tuple[str, ...]:
-    """Return a list of texts; one text is a list of one. Raises SettingsError."""
-    if isinstance(given, str):
-        return (given,)
-    found = tuple(given) if isinstance(given, Iterable) else (given,)
-    for one in found:
-        if not isinstance(one, str):
-            raise SettingsError(f"{name}: a text or a list of texts expected, got {one!r}")
-    return found
-
-
-def whole(name: str, given: Any) -> int:
-    """Return a whole number. Raises SettingsError."""
-    if isinstance(given, bool) or not isinstance(given, Integral):
-        raise SettingsError(f"{name}: a whole number expected, got {given!r}")
-    return int(given)
-
-
-def number(name: str, given: Any) -> float:
-    """Return a number as it is given; a finite one. Raises SettingsError."""
-    if not _is_number(given):
-        raise SettingsError(f"{name}: a number expected, got {given!r}")
-    return given
-
-
-def path(name: str, given: Any) -> str | Path:
-    """Return a name or a path. Raises SettingsError."""
-    if not isinstance(given, str | Path):
-        raise SettingsError(f"{name}: a name or a path expected, got {given!r}")
-    return given
-
-
-def vehicle_changes(given: Any, numbers: Mapping[str, Any]) -> dict[str, Any]:
+def checked(given: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Return the changes of a vehicle's numbers, dotted name → value, in lists and plain numbers.
 
     numbers: those of its description, which the changes must fit: names, types, lengths of lists,
     and what the plant requires of them. Raises SettingsError.
     """
-    if not isinstance(given, Mapping):
-        raise SettingsError(f"{WHERE} dotted name → value expected, got {given!r}")
     changed, found = deepcopy(dict(numbers)), {}
     for name, value in given.items():
         found[name] = value if name == EFFECTS else plain(value)
