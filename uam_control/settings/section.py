@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,25 @@ def read_section(file: Path, error: type[ValueError]) -> Section:
     return Section(values, f"{file}:", error)
 
 
+MISSING = object()
+
+
+def _reader(read: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a method that reads an entry return `default`, if one is given, for an entry left out."""
+
+    @wraps(read)
+    def reader(section: Section, key: str, *how: Any, default: Any = MISSING) -> Any:
+        left_out = default is not MISSING and not section.has(key)
+        return default if left_out else read(section, key, *how)
+
+    return reader
+
+
 class Section:
-    """A mapping of a file; its methods check one entry and raise `error` with its place."""
+    """A mapping of a file; its methods check one entry and raise `error` with its place.
+
+    Those for one value have an argument `default`, for an entry that may be left out.
+    """
 
     def __init__(self, values: dict[str, Any], where: str, error: type[ValueError]) -> None:
         self.values, self.where, self._error = values, where, error
@@ -65,7 +83,7 @@ class Section:
         """Return the entry `key`, a mapping whose keys its reader checks."""
         value = self.entry(key)
         if not isinstance(value, dict) or not value:
-            raise self._error(f"{self._name(key)}: a mapping expected, got {value!r}")
+            raise self.error(key, f"a mapping expected, got {value!r}")
         return value
 
     def entries(self, key: str, optional: bool = False) -> list[Section]:
@@ -74,7 +92,7 @@ class Section:
             return []
         value = self.entry(key)
         if not isinstance(value, list) or not value:
-            raise self._error(f"{self._name(key)}: a list of mappings expected, got {value!r}")
+            raise self.error(key, f"a list of mappings expected, got {value!r}")
         found = []
         for i, entry in enumerate(value):
             if not isinstance(entry, dict):
@@ -85,52 +103,68 @@ class Section:
     def _within(self, key: str, values: dict[str, Any]) -> Section:
         return self._inner.setdefault(key, Section(values, self._name(key), self._error))
 
+    @_reader
     def text(self, key: str) -> str:
         """Return the entry `key`, a text that is not empty."""
         value = self.entry(key)
         if not isinstance(value, str) or not value:
-            raise self._error(f"{self._name(key)}: a name expected, got {value!r}")
+            raise self.error(key, f"a name expected, got {value!r}")
         return value
 
+    @_reader
+    def one_of(self, key: str, allowed: Collection[str]) -> str:
+        """Return the entry `key`, one of the texts `allowed`."""
+        value = self.text(key)
+        if value not in allowed:
+            raise self.error(key, f"'{value}' is not one of {', '.join(allowed)}")
+        return value
+
+    @_reader
     def texts(self, key: str) -> tuple[str, ...]:
         """Return the entry `key`, a list of one text or more."""
         value = self.entry(key)
         if not isinstance(value, list) or not value or not all(isinstance(v, str) for v in value):
-            raise self._error(f"{self._name(key)}: a list of names expected, got {value!r}")
+            raise self.error(key, f"a list of names expected, got {value!r}")
         return tuple(value)
 
+    @_reader
     def switch(self, key: str) -> bool:
         """Return the entry `key`, true or false."""
         value = self.entry(key)
         if not isinstance(value, bool):
-            raise self._error(f"{self._name(key)}: true or false expected, got {value!r}")
+            raise self.error(key, f"true or false expected, got {value!r}")
         return value
 
+    @_reader
     def number(self, key: str) -> float:
         """Return the entry `key`, a finite number."""
         return self._checked(key, self.entry(key))
 
+    @_reader
     def positive(self, key: str) -> float:
         """Return the entry `key`, a finite number above 0."""
         value = self.number(key)
         if value <= 0.0:
-            raise self._error(f"{self._name(key)}: {value:g} is not above 0")
+            raise self.error(key, f"{value:g} is not above 0")
         return value
 
     def not_negative(self, key: str) -> float:
         """Return the entry `key`, a finite number of 0 or more."""
         value = self.number(key)
         if value < 0.0:
-            raise self._error(f"{self._name(key)}: {value:g} is below 0")
+            raise self.error(key, f"{value:g} is below 0")
         return value
 
-    def whole(self, key: str) -> int:
-        """Return the entry `key`, a whole number of 0 or more."""
+    @_reader
+    def whole(self, key: str, low: int = 0, high: float = math.inf) -> int:
+        """Return the entry `key`, a whole number from `low` to `high`."""
         value = self.entry(key)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise self._error(f"{self._name(key)}: 0, 1, 2, .. expected, got {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            allowed = f"{low} to {high}" if math.isfinite(high) else f"{low}, {low + 1}, .."
+            raise self.error(key, f"a whole number expected, {allowed}, got {value!r}")
         return value
 
+    @_reader
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return the entry `key`, a list of `count` finite numbers."""
         return self._listed(key, self.entry(key), count)
@@ -139,19 +173,19 @@ class Section:
         """Return the entry `key`, a list of lists of `count` finite numbers each."""
         value = self.entry(key)
         if not isinstance(value, list) or not value:
-            raise self._error(f"{self._name(key)}: a list of lists of numbers expected: {value!r}")
+            raise self.error(key, f"a list of lists of numbers expected: {value!r}")
         return tuple(self._listed(f"{key}[{i}]", row, count) for i, row in enumerate(value))
 
     def _listed(self, key: str, value: Any, count: int) -> tuple[float, ...]:
         if not isinstance(value, list) or len(value) != count:
-            raise self._error(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
+            raise self.error(key, f"a list of {count} numbers expected: {value!r}")
         return tuple(self._checked(key, item) for item in value)
 
     def _checked(self, key: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._error(f"{self._name(key)}: a number expected, got {value!r}")
+            raise self.error(key, f"a number expected, got {value!r}")
         if not math.isfinite(value):
-            raise self._error(f"{self._name(key)}: {value!r} is not finite")
+            raise self.error(key, f"{value!r} is not finite")
         return float(value)
 
     def _name(self, key: str) -> str:

@@ -108,11 +108,7 @@ def _rotor_model(rotor: Section) -> RotorModel:
 
 def _rotor(entry: Section) -> Rotor:
     position = entry.numbers("position", 3)
-    direction = entry.text("direction")
-    if direction not in DIRECTIONS:
-        raise VehicleError(
-            f"{entry.where}.direction: '{direction}' is not one of {', '.join(DIRECTIONS)}"
-        )
+    direction = entry.one_of("direction", DIRECTIONS)
     return Rotor(entry.text("name"), position, direction == DIRECTIONS[0])
 
 
@@ -164,9 +160,7 @@ def _check_hover(described: VehicleDescription) -> None:
 
 
 def _check_servo(servo: Servo, section: Section) -> None:
-    mode = section.text("mode")
-    if mode not in SERVO_MODES:
-        raise VehicleError(f"{section.where}.mode: '{mode}' is not one of {', '.join(SERVO_MODES)}")
+    section.one_of("mode", SERVO_MODES)
     section.positive("position_p_gain")
     section.positive("pwm_limit")
     if servo.effort_limit > servo.stall_torque:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from rich.table import Table
 
 from uam_control.vehicle import VehicleDescription
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, Subcommands
 from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.devices.dynamixel import control_table as names
@@ -39,7 +39,7 @@ Torque stays off. Exit status: 0 as described, 1 not, 2 wrong use or no device.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

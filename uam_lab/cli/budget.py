@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from uam_control.mission import load_scenario
-from uam_lab.cli.command import Command, chosen_process, number
+from uam_lab.cli.command import Command, Subcommands, chosen_process, number
 from uam_lab.experiments.budget.path import NoTicks
 from uam_lab.experiments.budget.shuttle import JOINTS, shuttle
 from uam_lab.flights import flight_settings
@@ -40,7 +40,7 @@ Exit status: 0 measured, 1 a flight was not completed, 2 wrong use.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.cli.command import Command, number
+from uam_lab.cli.command import Command, Subcommands, number
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import say
@@ -47,7 +47,7 @@ status: 0 written, 2 refused.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

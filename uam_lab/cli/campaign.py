@@ -9,7 +9,7 @@ from pathlib import Path
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
+from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, given_profile, place_of
 from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
@@ -36,7 +36,7 @@ same seed gives the same flights on any number of workers; more --flights only a
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from uam_lab.cli.command import Command, chosen_flight
+from uam_lab.cli.command import Command, Subcommands, chosen_flight
 from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.terminal import Terminal, say
 
@@ -28,7 +28,7 @@ was accepted; 1 items are open, or it was refused; 2 no flight or wrong use.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

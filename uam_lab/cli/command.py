@@ -47,6 +47,7 @@ from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
+Subcommands = argparse._SubParsersAction  # argparse has no other name for it
 WRONG_USE = 2  # exit status
 DEFAULT_SCENARIO = "pick_and_place"
 # the text of each is one line for the user
@@ -63,7 +64,7 @@ class Command:
 
     def __init__(
         self,
-        commands: argparse._SubParsersAction,
+        commands: Subcommands,
         name: str,
         run: Callable[[argparse.Namespace], int],
         summary: str,

@@ -14,6 +14,7 @@ from uam_lab.cli import study
 from uam_lab.cli.command import (
     DEFAULT_SCENARIO,
     Command,
+    Subcommands,
     chosen_effects,
     count,
     number,
@@ -48,7 +49,7 @@ The baselines are reconstructions (docs/law.md). The same command gives the same
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,
@@ -165,7 +166,7 @@ def run(options: argparse.Namespace) -> int:
         "profiles": {row.label: row.profile.file.name for row in rows},
         "budgets": comparison_report.budgets(rows),
     }
-    written = comparison_report.write(out, trials, results, modular, facts)
-    say(written.text)
-    say(f"vehicle  {vehicle.name}\nresults  {out}\nreport   {written.page}")
+    text, page = comparison_report.write(out, trials, results, modular, facts)
+    say(text)
+    say(f"vehicle  {vehicle.name}\nresults  {out}\nreport   {page}")
     return 0

@@ -6,7 +6,7 @@ import argparse
 
 from rich.text import Text
 
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, Subcommands
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_lab.preflight.doctor.finding import Finding, Verdict
@@ -27,7 +27,7 @@ Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

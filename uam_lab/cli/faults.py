@@ -13,6 +13,7 @@ from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import (
     Command,
+    Subcommands,
     chosen_effects,
     count,
     given_profile,
@@ -54,7 +55,7 @@ faults. Exit status: 0 all promises of the matrix kept, 1 a promise broken, 2 wr
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

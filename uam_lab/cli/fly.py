@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command, chosen_process, number
+from uam_lab.cli.command import Command, Subcommands, chosen_process, number
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import FlightOptions
@@ -56,7 +56,7 @@ Exit status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong 
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,
@@ -149,7 +149,7 @@ def fly(
     landing = settings.scenario.landing
     console = Terminal()
     with Progress(console, landing.end) as progress, Interrupts() as stop:
-        flight = Flight.of(settings, progress, stop, engine)
+        flight = Flight(checked=settings, observer=progress, stop=stop, flown_by=engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()
     return tell(console, settings, flight.result, name, video, report)

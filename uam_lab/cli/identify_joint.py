@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from uam_lab.cli.arm import described, driver_of
-from uam_lab.cli.command import Command, number
+from uam_lab.cli.command import Command, Subcommands, number
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.excitation import ExcitationParameters
@@ -32,7 +32,7 @@ Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no devi
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -10,7 +10,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, number
+from uam_lab.cli.command import Command, Subcommands, number
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -32,7 +32,7 @@ bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong u
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from uam_control.settings.visible_text import visible
-from uam_lab.cli.command import Command, chosen_flight, number
+from uam_lab.cli.command import Command, Subcommands, chosen_flight, number
 from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.terminal import say
 
@@ -39,7 +39,7 @@ Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommands to the command line."""
     for name, (summary, description) in WHAT.items():
         _command(commands, name, partial(_send, name), summary, description)
@@ -76,7 +76,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _command(
-    commands: argparse._SubParsersAction,
+    commands: Subcommands,
     name: str,
     act: Callable[[Operator, argparse.Namespace], int],
     summary: str,

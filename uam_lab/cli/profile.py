@@ -7,7 +7,7 @@ from typing import Any
 
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command, chosen_flight
+from uam_lab.cli.command import Command, Subcommands, chosen_flight
 from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.terminal import say
 
@@ -24,7 +24,7 @@ gains act on the same errors (docs/tuning.md). The log records every change.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -6,7 +6,7 @@ import argparse
 import os
 from dataclasses import replace
 
-from uam_lab.cli.command import Command, chosen_effects, number
+from uam_lab.cli.command import Command, Subcommands, chosen_effects, number
 from uam_lab.cli.fly import tell
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import require_ros
@@ -37,7 +37,7 @@ Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

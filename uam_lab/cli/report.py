@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, Subcommands
 from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
 from uam_lab.records.results.terminal import Terminal, say
@@ -23,7 +23,7 @@ examples:
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

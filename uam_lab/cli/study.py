@@ -16,6 +16,7 @@ from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import make_folder, read_json, versions, write_json
 from uam_lab.records.results.terminal import say
+from uam_lab.report.figures import style
 
 PARTS = ("margins", "varied", "law", "arm")
 TUNING = "tuning.json"  # of `--tune`: law → costs of the evaluations, best numbers
@@ -63,9 +64,9 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
         )
         done[law] = {"costs": found.costs, "best": found.best}
         write_json(file, done)
-    with figures.style.styled():
+    with style.styled():
         costs = {law: one["costs"] for law, one in done.items()}
-        figures.save(figures.tuning(costs), out / "tuning.png")
+        style.save(figures.tuning(costs), out / "tuning.png")
     for law, one in done.items():
         say(f"{law}: cost {one['costs'][0]:.4g} to {min(one['costs']):.4g}: {one['best']}")
         say(f"  {convergence(list(accumulate(one['costs'], min)), PATIENCE)}")
@@ -103,9 +104,9 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
             flown += [one.result for one in swept]
             texts.append(report.sweep_table(swept, {"law": "varied", "arm": "row"}[name]))
             drawn[name] = partial(getattr(figures, name), swept)
-    with figures.style.styled():
+    with style.styled():
         for name, draw in drawn.items():
-            figures.save(draw(), out / f"{name}.png")
+            style.save(draw(), out / f"{name}.png")
     text = "\n\n".join([*texts, "\n".join(f"- {one}" for one in said)]).strip() + "\n"
     made = f"\nStudy {study.name}, vehicle {study.vehicle.name}. Made by `{command_line()}`.\n"
     write_text(out / "tables.md", text + made)

@@ -9,13 +9,7 @@ import sys
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import (
-    Command,
-    chosen_effects,
-    count,
-    given_profile,
-    place_of,
-)
+from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, given_profile, place_of
 from uam_lab.experiments.trials.counting import Counting
 from uam_lab.experiments.tuning.convergence import LEAST, SMALL
 from uam_lab.experiments.tuning.convergence import in_words as convergence
@@ -44,7 +38,7 @@ study.journal.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, Subcommands
 from uam_lab.cli.fly import fly
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.node_options import SettingsError
@@ -37,7 +37,7 @@ status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

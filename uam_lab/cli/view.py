@@ -7,7 +7,7 @@ import json
 import os
 import sys
 
-from uam_lab.cli.command import Command, chosen_flight
+from uam_lab.cli.command import Command, Subcommands, chosen_flight
 from uam_lab.flights.flight_settings import require_ros
 
 EXAMPLES = """\
@@ -23,7 +23,7 @@ Ctrl-C ends the cockpit; the flight continues.
 """
 
 
-def add(commands: argparse._SubParsersAction) -> None:
+def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(
         commands,

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import rclpy
 from rclpy.node import Node
 
-from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, integer, text
@@ -70,8 +69,7 @@ def main() -> int:
         Watch(watcher, rightful),
         Services(node),
         options,
-        vehicle.coordinates[ARM],
-        vehicle.control_period,
+        vehicle,
         plain,
         todo,
         node.get_namespace(),

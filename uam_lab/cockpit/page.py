@@ -6,13 +6,15 @@ import math
 import queue
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import viser
 
+from uam_control.coordinates import ARM
 from uam_control.supervision import PreflightCheck
+from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.buttons import CommandButtons
 from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.checklist_panel import ChecklistPanel
@@ -57,21 +59,19 @@ class Page:
         watch: Watch,
         services: Services,
         options: dict[str, Any],
-        joints: Sequence[str],
-        period: float,
+        vehicle: VehicleDescription,
         plain: PlainPage,
         todo: queue.SimpleQueue[Callable[[], None]],
         namespace: str = "/",
     ):
-        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates; period: of
-        control [s]; plain: shows the same without the scene; todo: clicks, processed by `look`;
-        namespace: of the vehicle's nodes.
+        """options: config/views/cockpit.yaml; plain: shows the same without the scene; todo:
+        clicks, processed by `look`; namespace: of the vehicle's nodes.
         """
         self._server, self._options = server, options
         self._todo, self._plain = todo, plain
         self._answers_seen: int | None = None
         self._watch, self._services = watch, services
-        self._health = Health(options["silent_after"], namespace, period=period)
+        self._health = Health(options["silent_after"], namespace, period=vehicle.control_period)
         self._lines: deque[str] = deque(maxlen=LINES)
         self._gains: dict[str, NodeGains] = {}
         self._asked: set[str] = set()
@@ -95,7 +95,11 @@ class Page:
         gui.main_panel.set_width(LEFT_WIDTH)
         self._panel = gui.add_panel()
         self._charts = Charts(
-            gui, self._panel, options["window"], options["sample_interval"], joints
+            gui,
+            self._panel,
+            options["window"],
+            options["sample_interval"],
+            vehicle.coordinates[ARM],
         )
         self._panel.dock_right()
         self._panel.set_width(RIGHT_WIDTH)

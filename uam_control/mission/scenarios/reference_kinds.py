@@ -61,7 +61,7 @@ def legs(entry: Section, middle: Middle) -> tuple[Leg, ...]:
 def _curve(entry: Section, kind: str, middle: Middle) -> tuple[Leg, ...]:
     shape, pose = _shape(entry, kind), middle.chi
     pose[Z] = entry.positive("height") if "at" not in entry.values else 1.0
-    pose[:Z] = entry.numbers("centre", 2) if "centre" in entry.values else (0.0, 0.0)
+    pose[:Z] = entry.numbers("centre", 2, default=(0.0, 0.0))
     if "rise" in entry.values:
         shape += curves.rise(entry.number("rise"))
         pose[Z] += entry.number("rise") / 2.0
@@ -94,7 +94,7 @@ def _cut(path: Polynomials, ramp: float) -> tuple[Leg, ...]:
 
 def _laps(entry: Section, points: int = 1) -> float:
     """Return `laps`, 1 without; points: of one lap."""
-    laps = entry.positive("laps") if "laps" in entry.values else 1.0
+    laps = entry.positive("laps", default=1.0)
     if laps * points > MOST:
         raise entry.error("laps", f"{laps:g}: at most {MOST // points} are possible")
     return laps
@@ -173,7 +173,7 @@ def _timing(entry: Section, shape: tuple[Harmonic, ...], laps: float) -> tuple[P
     check_length(laps * period, entry.where)
     peak = curves.TURN * slope / period
     default = max(DEFAULT_RAMP, SMOOTHSTEP * peak / RAMP_ACCELERATION)
-    ramp = entry.positive("ramp") if "ramp" in entry.values else default
+    ramp = entry.positive("ramp", default=default)
     if ramp > laps * period:
         raise entry.error(
             "laps", f"{laps:g} of {period:.3g} s are shorter than the ramps of {ramp:.3g} s"

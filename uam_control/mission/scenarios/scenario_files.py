@@ -121,7 +121,7 @@ def _along_route(
     for key in top.values:
         if key not in ("description", "arm_start", "trajectory", "end"):
             raise top.error(key, "not together with a trajectory alone; give moves and landing")
-    end = top.text("end") if "end" in top.values else RETURN
+    end = top.text("end", default=RETURN)
     if end not in (RETURN, LAND):
         raise top.error("end", f"{end!r}, allowed: {RETURN}, {LAND}")
     end = end if options.end == AS_SCENARIO else options.end
@@ -208,7 +208,7 @@ def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescriptio
 
 
 def _description(top: Section) -> str:
-    return top.text("description") if "description" in top.values else ""
+    return top.text("description", default="")
 
 
 def _timeline(

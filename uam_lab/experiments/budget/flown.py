@@ -128,7 +128,7 @@ def fly(layout: str, settings: FlightSettings, observer: Observer, stop: StopReq
     settings: with `tick_times`.
     """
     shares = CoreShares(observer)
-    with Flight.of(settings, shares, stop) as flight:
+    with Flight(checked=settings, observer=shares, stop=stop) as flight:
         result = flight.wait()
     failure = result.outcome.failure or ("" if result.completed else result.reason)
     return read(layout, result.folder, settings.clock, shares.shares, failure)

@@ -14,6 +14,7 @@ from uam_lab.experiments.budget.flown import Budget
 from uam_lab.experiments.budget.path import SEGMENTS
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
+from uam_lab.records.results.templates import markdown_table
 from uam_lab.report.figures import style
 
 matplotlib.use("Agg")
@@ -27,35 +28,49 @@ HEAD = ("layout", "p50", "p99", "p99.9", "max", "missed", "cores", "pace")
 
 def summary(budgets: Sequence[Budget]) -> str:
     """Return Markdown: the latencies of each layout, then its path, then the work per tick."""
-    lines = [
+    parts = [
         "Latency [ms] from the sensors' publication to the setpoint's; missed: later than three "
         "control periods; cores: of the nodes that fly; pace: simulated per wall time.",
-        "",
-        _row(HEAD),
-        "|---" * len(HEAD) + "|",
+        markdown_table(HEAD, map(_totals, budgets)),
     ]
     for one in budgets:
-        numbers = [f"{value:.2f}" for value in one.figures.values()]
-        missed = f"{one.missed} of {one.ticks} ({100.0 * one.missed_share:.3f} %)"
-        missed = missed if one.clock == "realtime" else "-"
-        cores = f"{one.control_cores:.2f}" if one.cores else "-"
-        lines.append(_row((one.layout, *numbers, missed, cores, f"{one.pace:.3f}")))
-    for one in budgets:
-        lines += ["", f"## {one.layout}", "", "Way of a tick [ms], mean of all ticks:", ""]
-        lines += [_row(("node", *SEGMENTS, "sum")), "|---" * (len(SEGMENTS) + 2) + "|"]
         mean = one.path.mean()
         rows = [*zip(one.path.nodes, mean, strict=True), ("sum", mean.sum(axis=0))]
-        for node, times in rows:
-            lines.append(_row((node, *(f"{value:.3f}" for value in (*times, times.sum())))))
-        parts = list(next(iter(one.work.values())))
-        lines += ["", "Work per tick [ms], on the way or not, and cores in flight:", ""]
-        lines += [_row(("node", *parts, "cores")), "|---" * (len(parts) + 2) + "|"]
-        for node, work in one.work.items():
-            cores = f"{one.cores[node]:.3f}" if node in one.cores else "-"
-            lines.append(_row((node, *(f"{work[part]:.3f}" for part in parts), cores)))
+        names = list(next(iter(one.work.values())))
+        parts += [
+            f"## {one.layout}",
+            "Way of a tick [ms], mean of all ticks:",
+            markdown_table(
+                ("node", *SEGMENTS, "sum"),
+                ([node, *(f"{t:.3f}" for t in (*times, times.sum()))] for node, times in rows),
+            ),
+            "Work per tick [ms], on the way or not, and cores in flight:",
+            markdown_table(
+                ("node", *names, "cores"),
+                (
+                    [node, *(f"{work[name]:.3f}" for name in names), _cores(one.cores.get(node), 3)]
+                    for node, work in one.work.items()
+                ),
+            ),
+        ]
         if one.failure:
-            lines += ["", f"The flight was not completed: {one.failure}."]
-    return "\n".join(lines) + "\n"
+            parts.append(f"The flight was not completed: {one.failure}.")
+    return "\n\n".join(parts) + "\n"
+
+
+def _totals(one: Budget) -> list[str]:
+    missed = f"{one.missed} of {one.ticks} ({100.0 * one.missed_share:.3f} %)"
+    return [
+        one.layout,
+        *(f"{value:.2f}" for value in one.figures.values()),
+        missed if one.clock == "realtime" else "-",
+        _cores(one.control_cores if one.cores else None, 2),
+        f"{one.pace:.3f}",
+    ]
+
+
+def _cores(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def document(budgets: Sequence[Budget], facts: dict[str, Any]) -> dict[str, Any]:
@@ -138,7 +153,3 @@ def _bar(axis: Axes, row: int, begin: float, times: Sequence[float]) -> None:
     for name, value in zip(SEGMENTS, times, strict=True):
         axis.barh(row, value, left=begin, height=0.72, color=COLOURS[name])
         begin += value
-
-
-def _row(cells: Sequence[object]) -> str:
-    return "| " + " | ".join(map(str, cells)) + " |"

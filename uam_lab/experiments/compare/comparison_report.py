@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +30,6 @@ HEAD = ("controller", "payload_kg", "seed", "outcome", "place_error_m", "why")
 OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 
-@dataclass(frozen=True)
-class Written:
-    """text: for the console; page: report.html."""
-
-    text: str
-    page: Path
-
-
 def budgets(rows: Sequence[plan.ComparedController]) -> dict[str, str]:
     """Return the source of each profile's values: the comment at the beginning of its file."""
     found = {}
@@ -61,8 +52,11 @@ def write(
     results: Sequence[TrialResult],
     modular: ModularityEvidence,
     facts: Mapping[str, Any],
-) -> Written:
-    """Write flights.csv, comparison.json, tables.md, figures/ and report.html to `out`."""
+) -> tuple[str, Path]:
+    """Write flights.csv, comparison.json, tables.md, figures/ and report.html to `out`.
+
+    Returns a text for the console, and the page.
+    """
     found = tables.rows(results)
     claims = [*tables.claims(found), modular.claim]
     markdown = tables.as_markdown(found)
@@ -120,7 +114,7 @@ def write(
         shown=shown,
     )
     write_text(page, text)
-    return Written(markdown + "\n" + "\n".join(claims) + "\n", page)
+    return (markdown + "\n" + "\n".join(claims) + "\n", page)
 
 
 def _draw(

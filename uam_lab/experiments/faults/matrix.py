@@ -63,8 +63,8 @@ def read_promise(given: Any, where: str) -> Promise:
     for one in outcomes:
         if not isinstance(one, str) or one not in OUTCOMES:
             raise entry.error("outcome", f"unknown '{one}'; there are: {', '.join(OUTCOMES)}")
-    within = entry.positive("within") if entry.has("within") else math.inf
-    return Promise(outcomes, within, entry.text("because") if entry.has("because") else "")
+    within = entry.positive("within", default=math.inf)
+    return Promise(outcomes, within, entry.text("because", default=""))
 
 
 @dataclass(frozen=True)

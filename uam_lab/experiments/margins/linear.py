@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 TOGETHER = 100  # frequencies that are solved together
 STEP = 1e-6  # of inputs and states, for the central differences
@@ -96,7 +97,7 @@ def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> LinearBl
             outside[row, free.index(name)] = 1.0
         if name in outputs:
             feedback[row, outputs.index(name)] = 1.0
-    a, b, c, d = (_diagonal([getattr(block, part) for block in blocks]) for part in "abcd")
+    a, b, c, d = (block_diag(*(getattr(block, part) for block in blocks)) for part in "abcd")
     loop = np.linalg.inv(np.eye(len(inputs)) - feedback @ d)
     of_state, of_input = loop @ feedback @ c, loop @ outside
     return LinearBlock(
@@ -107,16 +108,6 @@ def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> LinearBl
         tuple(free),
         tuple(outputs),
     )
-
-
-def _diagonal(matrices: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the block-diagonal matrix of `matrices`, which may have no rows or no columns."""
-    whole = np.zeros((sum(len(one) for one in matrices), sum(one.shape[1] for one in matrices)))
-    row = column = 0
-    for one in matrices:
-        whole[row : row + len(one), column : column + one.shape[1]] = one
-        row, column = row + len(one), column + one.shape[1]
-    return whole
 
 
 def linearise(

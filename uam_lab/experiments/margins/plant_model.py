@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.linalg import expm
 
 from uam_control.coordinates import ARM
 from uam_lab.analysis.dynamics import Body
@@ -173,8 +174,6 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
 
 def zero_order_hold(a: np.ndarray, b: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Return A and B of the discrete system over `step` [s] with inputs that are constant in it."""
-    from scipy.linalg import expm  # the import takes half a second; `uam --help` skips it
-
     n, m = b.shape
     whole = expm(step * np.block([[a, b], [np.zeros((m, n + m))]]))
     return whole[:n, :n], whole[:n, n:]

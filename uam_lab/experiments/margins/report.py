@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,8 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, GrowingMode, step_response
 from uam_lab.experiments.margins.stack_model import Stack
 from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.result_folder import write_json
+from uam_lab.records.results.templates import markdown_table
 from uam_lab.report.figures import style
 
 matplotlib.use("Agg")
@@ -51,27 +52,25 @@ def smallest_delay(cases: Sequence[Case]) -> tuple[float, str]:
 
 def table(cases: Sequence[Case]) -> str:
     """Return the margins of all cases in Markdown."""
-    lines = []
+    parts = []
     for case in cases:
-        found = case.analysis
         rho = ", ".join(f"{name} {value:.3g}" for name, value in case.rho.items())
-        lines += [
-            f"{case.label}; rho: {rho}; {_mode(found.mode)}; "
+        parts += [
+            f"{case.label}; rho: {rho}; {_mode(case.analysis.mode)}; "
             f"without dry friction of the joints {_mode(case.sliding)}",
-            "",
-            "| " + " | ".join(HEAD) + " |",
-            "|---" * len(HEAD) + "|",
+            markdown_table(HEAD, _rows(case.analysis)),
         ]
-        for name, (_, m) in found.loops.items():
-            gain = f"{_text(m.gain, 1)} / -{_text(m.gain_down, 1)}"
-            row = (_text(m.crossover, 2), _text(m.bandwidth, 2), _text(m.phase, 1), gain)
-            row = (name, *row, _text(1e3 * m.delay, 1), _text(m.peak, 2))
-            lines.append("| " + " | ".join(row) + " |")
-        delay = _text(1e3 * found.setpoint_delay, 1)
-        lines += [f"| all setpoints | | | | | {delay} | |", ""]
     delay, label = smallest_delay(cases)
-    lines.append(f"Delay margin of the setpoint path: {1e3 * delay:.1f} ms ({label}).")
-    return "\n".join(lines)
+    parts.append(f"Delay margin of the setpoint path: {1e3 * delay:.1f} ms ({label}).")
+    return "\n\n".join(parts)
+
+
+def _rows(found: Analysis) -> Iterator[list[str]]:
+    for name, (_, m) in found.loops.items():
+        gain = f"{_text(m.gain, 1)} / -{_text(m.gain_down, 1)}"
+        row = [name, _text(m.crossover, 2), _text(m.bandwidth, 2), _text(m.phase, 1), gain]
+        yield [*row, _text(1e3 * m.delay, 1), _text(m.peak, 2)]
+    yield ["all setpoints", "", "", "", "", _text(1e3 * found.setpoint_delay, 1), ""]
 
 
 def document(cases: Sequence[Case], facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,8 +93,7 @@ def document(cases: Sequence[Case], facts: Mapping[str, Any]) -> dict[str, Any]:
 def write(out: Path, cases: Sequence[Case], facts: Mapping[str, Any]) -> None:
     """Write margins.md, margins.json, bode.png and step.png."""
     write_text(out / "margins.md", table(cases) + "\n")
-    plain = _finite(document(cases, facts))
-    write_text(out / "margins.json", json.dumps(plain, indent=1, allow_nan=False) + "\n")
+    write_json(out / "margins.json", document(cases, facts))
     with style.styled():
         style.save(bode(cases), out / "bode.png")
         style.save(steps(cases), out / "step.png")
@@ -180,12 +178,3 @@ def _mode(mode: GrowingMode) -> str:
 
 def _text(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-
-def _finite(value: Any) -> Any:
-    """Return `value` with null for numbers that JSON does not have."""
-    if isinstance(value, Mapping):
-        return {key: _finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

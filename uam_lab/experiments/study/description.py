@@ -122,14 +122,9 @@ def _mapping(section: Section, key: str) -> Section:
 
 def _row(entry: Section, label: str) -> Row:
     entry.only(("law", "frozen", "profiles", "conditions", "autopilot", "common"))
-    law, frozen = (entry.text(k) if k in entry.values else "" for k in ("law", "frozen"))
-    if law and law not in catalogue.LAWS:
-        raise entry.error("law", f"'{law}': {', '.join(catalogue.LAWS)} are allowed")
-    if frozen not in FROZEN:
-        raise entry.error("frozen", f"'{frozen}': {', '.join(FROZEN[1:])} are allowed")
-    profiles, conditions = (
-        entry.texts(k) if k in entry.values else () for k in ("profiles", "conditions")
-    )
+    law = entry.one_of("law", catalogue.LAWS, default="")
+    frozen = entry.one_of("frozen", FROZEN[1:], default="")
+    profiles = entry.texts("profiles", default=())
     if not law and not profiles:
         raise StudyError(f"{entry.where}: a law or profiles expected")
     return Row(
@@ -138,8 +133,8 @@ def _row(entry: Section, label: str) -> Row:
         frozen,
         profiles,
         entry.values.get("autopilot") == "own",
-        "common" in entry.values and entry.switch("common"),
-        conditions,
+        entry.switch("common", default=False),
+        entry.texts("conditions", default=()),
     )
 
 
@@ -150,8 +145,8 @@ def _condition(label: str, base: Section, entry: Section) -> Condition:
         _mapping(base, key).values | _mapping(entry, key).values
         for key in ("vehicle", "trajectory")
     )
-    factor = entry.text("of") if "of" in entry.values else ""
-    value = entry.number("value") if "value" in entry.values else 0.0
+    factor = entry.text("of", default="")
+    value = entry.number("value", default=0.0)
     return Condition(label, vehicle, trajectory, factor, value)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -186,8 +185,3 @@ def tuning(costs: dict[str, Sequence[float]]) -> Figure:
     figure.subplots_adjust(left=0.08, right=0.985, top=0.87, bottom=0.15)
     style.title(figure, "Search of the adaptation's own numbers")
     return figure
-
-
-def save(figure: Figure, file: Path) -> None:
-    """Write a figure."""
-    style.save(figure, file)

@@ -152,10 +152,7 @@ def load_space(
     if top.has("judged_as"):  # flights and cost of another space, for a fair comparison
         other = configuration.named("tuning", top.text("judged_as"))
         top.values = {**read_section(other, TuningError).values, **top.values}
-    law = top.text("controller")
-    if law not in catalogue.LAWS:
-        there = ", ".join(catalogue.LAWS)
-        raise TuningError(f"{file}: unknown controller '{law}'; there are: {there}")
+    law = top.one_of("controller", catalogue.LAWS)
     start = start or default_profile(law, vehicle)
     two = top.has("delay_margin")
     space = Space(
@@ -195,7 +192,7 @@ def _cost(entry: Section, coordinates: int) -> Cost:
 
 def _knob(entry: Section, start: Profile) -> Knob:
     entry.only(("node", "nodes", "parameter", "entries", "low", "high"))
-    nodes = entry.texts("nodes") if "nodes" in entry.values else (entry.text("node"),)
+    nodes = entry.texts("nodes", default=()) or (entry.text("node"),)
     entries = entry.values.get("entries", [])
     if not isinstance(entries, list) or not all(type(one) is int for one in entries):
         raise entry.error("entries", f"a list of 0, 1, 2, .. expected, got {entries!r}")

@@ -54,41 +54,28 @@ class Flight:
     nothing can be waited for, set or commanded before the end.
     """
 
-    def __init__(self, *, observer: Observer | None = None, **options: Any) -> None:
+    def __init__(
+        self,
+        *,
+        observer: Observer | None = None,
+        checked: FlightSettings | None = None,
+        stop: StopRequest | None = None,
+        flown_by: Engine | None = None,
+        **options: Any,
+    ) -> None:
         """options: see `uam_lab.flights.flight_options.FlightOptions`; observer: for the progress.
 
-        Raises SettingsError and the errors named there; nothing is started yet.
+        checked: settings in place of options; stop: to end the flight; flown_by: None for the
+        engine of the settings. Raises SettingsError and what `flight_settings.settings` raises;
+        nothing is started yet.
         """
         if observer is not None and not isinstance(observer, Observer):
             raise SettingsError(f"observer: an Observer expected, got {observer!r}")
-        options.setdefault("command", shlex.join(["python", *sys.argv]))
-        self._prepare(flight_settings.settings(**options), observer, StopRequest())
-
-    @classmethod
-    def of(
-        cls,
-        settings: FlightSettings,
-        observer: Observer | None = None,
-        stop: Any = None,
-        engine: Engine | None = None,
-    ) -> Flight:
-        """Return a flight with checked settings.
-
-        stop: a StopRequest to end it; engine: None for that of the settings.
-        """
-        flight = cls.__new__(cls)
-        flight._prepare(settings, observer, stop or StopRequest(), engine)
-        return flight
-
-    def _prepare(
-        self,
-        settings: FlightSettings,
-        observer: Observer | None,
-        stop: StopRequest,
-        engine: Engine | None = None,
-    ) -> None:
-        self.settings, self._engine = settings, engine
-        self._history, self._stop = History(observer or Observer()), stop
+        if checked is None:
+            options.setdefault("command", shlex.join(["python", *sys.argv]))
+            checked = flight_settings.settings(**options)
+        self.settings, self._engine = checked, flown_by
+        self._history, self._stop = History(observer or Observer()), stop or StopRequest()
         self._thread: threading.Thread | None = None
         self._folder: ResultFolder | None = None
         self._result: FlightResult | None = None
@@ -196,14 +183,21 @@ class Flight:
         timeout: [s] of wall time. Raises NotInTime; FlightEnded if the flight ends before.
         """
         watch = self._waiting(what)
-        self._history.wait(lambda: watch.done(), timeout, watch.name)
-        return watch.result()
+        self._history.wait(watch.done, timeout, watch.name)
+        return self._met(watch)
 
     async def wait_for_async(self, what: Kind, timeout: float | None = None) -> FlightStatus:
         """Return as `wait_for`, without blocking the event loop."""
         watch = self._waiting(what)
         await self._poll(watch.done, timeout, watch.name)
-        return watch.result()
+        return self._met(watch)
+
+    def _met(self, watch: _Wait) -> FlightStatus:
+        """Return the status that was waited for. Raises FlightEnded."""
+        if watch.status is None:
+            self._raise_error()
+            raise FlightEnded(f"the flight ended before {watch.name}: {self._end()}")
+        return watch.status
 
     async def _poll(self, done: Callable[[], bool], timeout: float | None, what: str) -> None:
         loop = asyncio.get_running_loop()
@@ -216,7 +210,7 @@ class Flight:
     def _waiting(self, what: Kind) -> _Wait:
         self._need_nodes("wait for a phase")
         if callable(what):
-            return _Wait(self, what, "the condition")
+            return _Wait(self._history, what, "the condition")
         phases = dict.fromkeys([*(name for _, name in self.settings.scenario.phases), *PHASES])
         states = [state.value for state in State]
         if what not in phases and what not in states:
@@ -224,7 +218,9 @@ class Flight:
                 f"unknown phase or state '{what}'; there are the phases {', '.join(phases)} and "
                 f"the states {', '.join(states)}"
             )
-        return _Wait(self, lambda status: what in (status.phase, status.state), f"'{what}'")
+        return _Wait(
+            self._history, lambda status: what in (status.phase, status.state), f"'{what}'"
+        )
 
     # --- what is known ---------------------------------------------------------------------
 
@@ -404,23 +400,16 @@ class Flight:
 
 
 class _Wait:
-    """Waits for a status of a kind, or for the end of the flight."""
+    """Waits for a status of a kind, or for the end of the flight; status: None at its end."""
 
-    def __init__(self, flight: Flight, condition: Condition, name: str) -> None:
-        self._flight, self._condition, self.name = flight, condition, name
-        self._found: FlightStatus | None = None
+    def __init__(self, history: History, condition: Condition, name: str) -> None:
+        self._history, self._condition, self.name = history, condition, name
+        self.status: FlightStatus | None = None
 
     def done(self) -> bool:
         """Return whether there is such a status, or the flight is over."""
-        self._found = self._flight._history.found(self._condition)
-        return self._found is not None or self._flight._history.over
-
-    def result(self) -> FlightStatus:
-        """Return the status. Raises FlightEnded."""
-        if self._found is None:
-            self._flight._raise_error()
-            raise FlightEnded(f"the flight ended before {self.name}: {self._flight._end()}")
-        return self._found
+        self.status = self._history.found(self._condition)
+        return self.status is not None or self._history.over
 
 
 def _engine(name: str) -> Engine:

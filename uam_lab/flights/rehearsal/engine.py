@@ -144,11 +144,9 @@ class _Rehearsal:
                 start_nodes(children, *needed, without=left_out, optional=(wiring.COCKPIT,))
 
         failure, _ = supervise.run(
-            self._settings,
-            self._folder,
-            self._ports,
-            self._observer,
-            self._stop,
+            supervise.FlightRun(
+                self._settings, self._folder, self._ports, self._observer, self._stop
+            ),
             publishers,
             start,
             lambda children: self._announcement(children, devices),

@@ -93,11 +93,7 @@ def _supervise(
     last: receives the newest status of a flight without a failure.
     """
     failure, listener = supervise.run(
-        settings,
-        folder,
-        ports,
-        observer,
-        stop,
+        supervise.FlightRun(settings, folder, ports, observer, stop),
         node_arguments.publishers(settings),
         lambda children: _start(children, settings, folder, ports),
         lambda children: _announcement(children, settings, ports),

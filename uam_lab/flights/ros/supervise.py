@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.flight_settings import FlightSettings
@@ -45,12 +45,18 @@ def prepare(modules: Iterable[str], observer: Observer) -> None:
     await_orphans(observer.message)
 
 
+class FlightRun(NamedTuple):
+    """One flight as every engine over ROS has it."""
+
+    settings: FlightSettings
+    folder: ResultFolder
+    ports: Ports
+    observer: Observer
+    stop: StopRequest
+
+
 def run(
-    settings: FlightSettings,
-    folder: ResultFolder,
-    ports: Ports,
-    observer: Observer,
-    stop: StopRequest,
+    flight: FlightRun,
     publishers: str,
     start: Callable[[Processes], None],
     announce: Callable[[Processes], Iterable[str]],
@@ -61,6 +67,7 @@ def run(
     publishers: see `rightful`; start: starts them; announce: returns lines about the start;
     course: see `Course`. Returns the failure, if any, and the listener with the newest status.
     """
+    settings, folder, ports, observer, stop = flight
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
     common = node_arguments.common_remappings(settings)

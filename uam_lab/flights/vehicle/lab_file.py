@@ -5,8 +5,7 @@ Names of files in a lab file are relative to it, those of config/ need no folder
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -83,8 +82,8 @@ def load_lab(name_or_file: str | Path) -> Lab:
         scenario=_near(top, top.text("scenario")),
         autopilot=_autopilot(top),
         gcs=_gcs(top),
-        autopilot_system=_system(top),
-        imu=_one_of(top, "imu", IMUS),
+        autopilot_system=top.whole("autopilot_system", 1, LAST_SYSTEM, default=1),
+        imu=top.one_of("imu", IMUS),
         room=_room(top),
         mocap=mocap,
         arm=chain,
@@ -92,9 +91,9 @@ def load_lab(name_or_file: str | Path) -> Lab:
         magnet=_magnet(top),
         cockpit=_cockpit(top),
         nodes=_nodes(top),
-        out=Path(top.text("out")) if "out" in top.values else OUT,
+        out=Path(top.text("out", default=OUT)),
         process=_process(top),
-        fused="layout" in top.values and _one_of(top, "layout", LAYOUTS) == FUSED,
+        fused=top.one_of("layout", LAYOUTS, default=SEPARATE) == FUSED,
     )
     _check_profile(top, lab)
     try:
@@ -164,14 +163,6 @@ def _gcs(top: Section) -> str:
     return url
 
 
-def _system(top: Section) -> int:
-    value = top.values.get("autopilot_system", 1)
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= LAST_SYSTEM:
-        what = f"a whole number from 1 to {LAST_SYSTEM} expected, as MAV_SYS_ID of PX4"
-        raise top.error("autopilot_system", f"{what}, got {value!r}")
-    return value
-
-
 def _room(top: Section) -> Room:
     room = top.section("room")
     room.only("xyz")
@@ -185,7 +176,7 @@ def _room(top: Section) -> Room:
 
 def _magnet(top: Section) -> Magnet:
     section = top.section("magnet")
-    through = _one_of(section, "through", THROUGH)
+    through = section.one_of("through", THROUGH)
     values = {name: value for name, value in section.values.items() if name != "through"}
     sets: dict[str, type[ParameterSet]] = {}
     if through == GPIO:
@@ -211,14 +202,10 @@ def _cockpit(top: Section) -> Page:
     section = top.section("cockpit")
     section.only(("address", "port"))
     page = Page()
-    if "address" in section.values:
-        page = replace(page, address=section.text("address"))
-    if "port" in section.values:
-        port = section.number("port")
-        if port != int(port) or not 0 <= port <= 65535:
-            raise section.error("port", f"{port:g} is not a whole number from 0 to 65535")
-        page = replace(page, port=int(port))
-    return page
+    return Page(
+        section.text("address", default=page.address),
+        section.whole("port", 0, 65535, default=page.port),
+    )
 
 
 def _nodes(top: Section) -> dict[str, dict[str, Any]]:
@@ -267,13 +254,6 @@ def _near(top: Section, name: str) -> str:
     """Return the path of the file `name` beside the lab file; without one, `name` as it is."""
     beside = _file(top).parent / Path(name).expanduser()
     return str(beside.absolute()) if beside.is_file() else name
-
-
-def _one_of(section: Section, key: str, allowed: Collection[str]) -> str:
-    value = section.text(key)
-    if value not in allowed:
-        raise section.error(key, f"'{value}' is not one of {', '.join(allowed)}")
-    return value
 
 
 def _tried(section: Section, key: str, make: Callable[[], Any]) -> Any:

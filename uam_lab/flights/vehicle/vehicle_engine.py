@@ -75,11 +75,7 @@ class VehicleEngine:
                 return VehicleCourse(lab, listener, guest, observer, stop)
 
             failure, _ = supervise.run(
-                settings,
-                folder,
-                ports,
-                observer,
-                stop,
+                supervise.FlightRun(settings, folder, ports, observer, stop),
                 publishers,
                 lambda children: start_nodes(children, lab, settings, folder, publishers),
                 lambda children: _announcement(children, ports),

@@ -76,15 +76,18 @@ class ResultFolder:
             folder = cls(Path(out).expanduser())
             _usable(folder.path)
             folder.refuse_flight()
-            folder._claim = claim(folder.path)
         else:
             folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
-            folder._claim = claim(folder.path)
-        if folder._link.parent.absolute() == RESULTS.absolute():
-            if folder._link.is_symlink():
-                folder._latest_before = os.readlink(folder._link)
-            _point(folder._link, folder.path.name)
+        folder.take()
         return folder
+
+    def take(self) -> None:
+        """Claim the folder for a flight; point results/latest at one in results/."""
+        self._claim = claim(self.path)
+        if self._link.parent.absolute() == RESULTS.absolute():
+            if self._link.is_symlink():
+                self._latest_before = os.readlink(self._link)
+            _point(self._link, self.path.name)
 
     @property
     def _link(self) -> Path:
