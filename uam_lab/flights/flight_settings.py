@@ -133,13 +133,13 @@ AS_GIVEN = (
 )
 
 
-def settings(**given: Any) -> FlightSettings:
+def settings(scenario: str | Path | None = None, **given: Any) -> FlightSettings:
     """Return the settings of a flight with these options, see `FlightOptions`.
 
     Raises SettingsError, ConfigurationError, ScenarioError (InfeasibleReference too), ProfileError,
     Px4Error, PortError, PlantError, FaultError; each text is one line for the user.
     """
-    return checked(FlightOptions.of(**given))
+    return checked(FlightOptions.of(scenario=scenario, **given))
 
 
 def checked(o: FlightOptions) -> FlightSettings:
