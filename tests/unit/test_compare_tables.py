@@ -68,8 +68,8 @@ def test_a_report_without_the_papers_rows_overlays_the_first_ones(tmp_path, make
     facts = dict.fromkeys(("vehicle", "scenario", "command"), "x")
     facts |= {"payloads_kg": (0.2,), "seeds": (1,), "profiles": {}, "budgets": {}}
     results = [flight(FROZEN, 1, 0.1)]
-    written = comparison_report.write(tmp_path, [trial], results, modular, facts)
-    assert f"overlaid: {FROZEN}." in written.page.read_text()
+    _, page = comparison_report.write(tmp_path, [trial], results, modular, facts)
+    assert f"overlaid: {FROZEN}." in page.read_text()
     assert (tmp_path / "figures" / "position_errors.png").exists()
 
 
