@@ -30,8 +30,9 @@ from uam_sim_bridge.plant import Vehicle
 
 STRETCH = 250  # ticks
 PHYSICS, REST = "bare mj_step", "between the parts"
-STEADY, OBJECTS = "steady ticks beside mj_step", "ticks of the objects beside mj_step"
-IN, BACK, GRASP = "copied in", "copied back", "executive of the grasps"
+LOOP, OBJECTS = "compiled ticks beside mj_step", "ticks of the objects beside mj_step"
+ASKED, READY, BACK = "whether something is to be decided", "path ahead", "back to the objects"
+GRASP = "executive of the grasps"
 
 
 def new_flight() -> DirectFlight:
@@ -83,18 +84,17 @@ class Watch:
 
     def __call__(self, flight: DirectFlight) -> None:
         """Watch a flight that begins."""
-        steady = flight.steady
+        self.compiled = compiled = flight.compiled
         for name, owner, method in (
-            (IN, steady, "_load"),
-            (BACK, steady, "_store"),
-            (GRASP, steady._reference, "watch"),
+            (ASKED, compiled, "_nominal"),
+            (READY, compiled, "_renew"),
+            (BACK, compiled, "_resume"),
+            (GRASP, flight.mission, "watch"),
             (OBJECTS, flight, "tick"),
-            (OBJECTS, flight, "finish"),
+            (OBJECTS, compiled, "_finish"),
+            (LOOP, compiled, "_run"),
         ):
             setattr(owner, method, self._timed(name, getattr(owner, method)))
-        present = steady._present
-        steady._present = lambda: self._timed(STEADY, present())
-        self.steady = steady
 
     def _timed(self, name: str, run: Callable) -> Callable:
         times, calls, clock = self.times, self.calls, time.process_time
@@ -122,11 +122,11 @@ def parts() -> dict[str, float]:
     watch = Watch()
     flown, physics, _, ticks = measure(watch)
     times = watch.of_the_flight(flown)
-    share = watch.steady.ticks / ticks
-    times[STEADY] -= share * physics
+    share = watch.compiled.ticks / ticks
+    times[LOOP] -= share * physics
     times[OBJECTS] -= (1.0 - share) * physics
     shown = {name: 1e6 * seconds / ticks for name, seconds in times.items()}
-    print(f"{share:.1%} of the ticks are steady, in {watch.calls[STEADY]} calls\n")
+    print(f"{share:.1%} of the ticks are compiled, in {watch.calls[LOOP]} calls\n")
     return {PHYSICS: 1e6 * physics / ticks} | dict(sorted(shown.items(), key=lambda one: -one[1]))
 
 

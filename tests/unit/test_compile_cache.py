@@ -180,7 +180,7 @@ def test_a_file_that_cannot_be_read_is_compiled_again(tmp_path, content, start):
 
 
 def test_a_function_with_two_inner_functions_has_the_code_of_each(tmp_path, start):
-    """As the steady ticks of the direct engine, with the step of a law."""
+    """As the compiled ticks of the direct engine, with the step of a law."""
     (tmp_path / "closure.py").write_text(CLOSURE.format(double=2))
     for hits in (0, 1):
         process = start("closure")

@@ -90,7 +90,7 @@ class Rig:
 
 
 def test_the_stages_are_those_of_the_block_diagram():
-    assert [name for name, _ in STAGES] == [
+    assert [stage.name for stage in STAGES] == [
         "listeners of the sensors",
         "estimator",
         "mission",
@@ -105,7 +105,7 @@ def test_the_stages_are_those_of_the_block_diagram():
 def test_a_further_stage_comes_before_the_one_named():
     rig, seen = Rig(), []
     rig.control.insert("bridge", "probe", lambda tick: not seen.append(tick.signals.stamp))
-    assert [name for name, _ in rig.control.stages][5:8] == ["arm law", "probe", "bridge"]
+    assert [stage.name for stage in rig.control.stages][5:8] == ["arm law", "probe", "bridge"]
     assert len(STAGES) == 8
     rig.tick()
     assert seen == [0]

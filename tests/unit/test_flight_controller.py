@@ -15,7 +15,7 @@ from uam_sim_bridge.nodes import flight_controller
 
 
 def test_every_stage_of_the_tick_has_its_node():
-    assert list(flight_controller.ACTS) == [name for name, _ in STAGES]
+    assert list(flight_controller.ACTS) == [stage.name for stage in STAGES]
     acting = [act[0] for act in flight_controller.ACTS.values() if act]
     assert tuple(dict.fromkeys(acting)) == wiring.FUSED == tuple(flight_controller.KINDS)
     for act in filter(None, flight_controller.ACTS.values()):

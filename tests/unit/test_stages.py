@@ -17,10 +17,19 @@ from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.supervisor_inputs import SupervisorInputs
+from uam_control.stages.supervisor_inputs import (
+    BIAS,
+    GAINS,
+    JOINTS,
+    LIFT,
+    MOCAP,
+    PAYLOAD,
+    SupervisorInputs,
+)
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_control.supervision import Authority
+from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 
@@ -132,6 +141,34 @@ def test_an_answer_that_is_early_does_not_replace_the_one_before_it():
 def mission_stage():
     parameters = load_profile("s500").sets["mission"]
     return MissionStage(Mission(load_scenario("hover"), parameters), Timing())
+
+
+def test_messages_of_stages_are_read_as_those_of_other_processes():
+    names = ("K0", "other"), ("zeta",), ("K1",)
+    put, kept = SupervisorInputs(0.004), SupervisorInputs(0.004)
+    put.share(2, names)
+    for stamp in range(0, 200 * MS, 4 * MS):
+        now, way = stamp / SECOND, np.array([1e-9 * stamp, 0.0, 1.0])
+        effort, gains = np.array([0.1, now]), np.array([now, 9.0])
+        put.put(MOCAP, stamp, way, LEVEL)
+        kept.keep("mocap", kept.mocap, (stamp, way, LEVEL))
+        put.put(JOINTS, stamp, effort)
+        kept.keep("joints", kept.joints, (stamp, effort, effort, effort))
+        put.put(PAYLOAD, stamp, 2.0 * way)
+        kept.keep("payload", kept.payload, (stamp, 2.0 * way, LEVEL))
+        put.put(BIAS, stamp, 0.1 * way)
+        kept.keep("bias", kept.inputs.accelerometer_bias, (now, 0.1 * way))
+        put.put(LIFT, stamp, (20.0 + now,))
+        kept.keep("lift", kept.inputs.lift, (20.0 + now,))
+        for i, own in enumerate(names):
+            given = gains[: len(own)]
+            put.put(GAINS + i, stamp, given)
+            kept.keep(SUBSYSTEMS[i], kept.inputs.gains, (now, SUBSYSTEMS[i], own, given))
+        for one, other in zip(put.tick(stamp).arrays, kept.tick(stamp).arrays, strict=True):
+            np.testing.assert_array_equal(one, other)
+        read = put.readings
+        np.testing.assert_array_equal(read.payload_position, 2.0 * read.mocap_position)
+    assert put.settled and not kept.settled
 
 
 def test_the_mission_makes_the_reference_of_the_next_tick():

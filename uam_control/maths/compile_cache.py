@@ -42,6 +42,13 @@ class CompileCache(FunctionCache):
     """The cache of one function; `dispatcher._cache` of numba."""
 
     def __init__(self, function: Callable):
+        given = [name for name, _ in _given(function)]
+        if given:
+            # The same source with other functions is another function. numba's own name of its
+            # machine code ends in a counter of the process that compiled it: two of them, from two
+            # processes, may have one name, and a third process that loads both would mix them up.
+            digest = hashlib.sha256(repr(given).encode()).hexdigest()[:8]
+            function.__qualname__ = f"{function.__qualname__}_{digest}"
         super().__init__(function)
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, function)
 
@@ -63,9 +70,6 @@ class _Files(IndexDataCacheFile):
 
     def __init__(self, folder: str, base: str, function: Callable):
         super().__init__(folder, base, None)
-        given = [name for name, _ in _given(function)]
-        if given:  # the same source with other functions is another function
-            base += "-" + hashlib.sha256(repr(given).encode()).hexdigest()[:8]
         self._base, self._function = base, function
         # read the source now: at the first call it may already be edited
         _content(Path(function.__code__.co_filename))

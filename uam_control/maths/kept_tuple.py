@@ -71,14 +71,14 @@ def bound(function: Callable, values: tuple, *arguments: object) -> Callable:
     these examples, see `compiled.prepared`.
     """
     kept = KeptTuple(values)
-    call = _calling(function, kept.read, len(arguments))
+    call = calling(function, kept.read, len(arguments))
     call = partial(compiled.prepared(call, kept.address, *arguments), kept.address)
     call.kept = kept  # as long as somebody may call it
     return call
 
 
 @cache
-def _calling(function: Callable, read: Callable[[int], Any], count: int) -> Callable:
+def calling(function: Callable, read: Callable[[int], Any], count: int) -> Callable:
     """Return the function that reads the first argument of `function` at an address; count: of its
     further ones."""
     calls = (

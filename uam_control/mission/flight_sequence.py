@@ -573,6 +573,7 @@ class Mission:
             and not (ended or self._requests or self._override.given)
             and self._standing is None
             and self._descent is None
+            and self._beside is None
             and self._magnet_on(decision) == output.magnet
             and self._phase(decision) == output.phase
         )

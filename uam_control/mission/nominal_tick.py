@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import SILENT
 from uam_control.coordinates import CHI, Z
 from uam_control.maths.compiled import borrowing
 from uam_control.mission.guidance import GuidanceArrays, follow_path
 from uam_control.mission.payload_watch import due
 from uam_control.mission.touchdown import on_ground
 from uam_control.supervision.checks import CheckArrays, measure_all
-from uam_control.supervision.observation import ReadingArrays
+from uam_control.supervision.observation import NUMBERS, ReadingArrays
 from uam_control.supervision.supervisor import stays_behind
 
 
@@ -27,6 +28,7 @@ class MissionArrays(NamedTuple):
     numbers: np.ndarray
 
 
+AUTOPILOT_AGE = NUMBERS.index("autopilot_age")
 # takes_off: whether the vehicle is not airborne yet. [s]: newest step, take-off; ground [m] below
 # it; height [m], speed [m/s] of a touchdown, and scenario time [s] from which on it is one
 WHOLE, REAL = "takes_off", "stamp takeoff ground height speed half"
@@ -44,6 +46,8 @@ def follow_scenario(
     calm = measure_all(a.checks, state, path.reference, m.ground, readings, True)
     late = path.times[path.numbers[0].following] >= m.half
     if not calm or (late and on_ground(state, m.ground, m.height, m.speed)):
+        return False
+    if readings.values[AUTOPILOT_AGE] > SILENT:  # see `Mission.step`: the arm may give way
         return False
     if m.takes_off:
         planned = path.reference[CHI, Z] - m.ground

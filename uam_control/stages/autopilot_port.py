@@ -8,11 +8,26 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from uam_control.offboard.modes import Mode
 from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.vision_pose import VisionPose
+
+
+class PortSteps(NamedTuple):
+    """Compiled methods of a port to an autopilot in the same process, on the `arrays` of the port.
+
+    now [s]: of the tick. ready(a, now): whether messages come and setpoints go as usual; poll(a,
+    now); send_vision(a, exposed, pose): exposed [s], pose (7,): position [m, ENU] and quaternion
+    [w x y z]; send_setpoint(a, now, rates, thrust): rates (3,) [rad/s, FLU].
+    """
+
+    ready: Callable
+    poll: Callable
+    send_vision: Callable
+    send_setpoint: Callable
 
 
 class AutopilotPort(Protocol):
@@ -29,6 +44,7 @@ class AutopilotPort(Protocol):
     failsafe: bool  # the autopilot flies its own failsafe
     killed: bool  # the kill switch or flight termination holds the motors
     armed_since: float | None  # [s] tick at which it was first known armed; None while it is not
+    steps: PortSteps | None  # None: has none now
 
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""

@@ -11,20 +11,28 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from functools import cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from uam_control.control.sample_hold import SampleHold
 from uam_control.frames import swap_body
-from uam_control.maths.memory import Flag, Number, record
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import OffboardSequence
+from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.kinds.rates import rates_setpoint
-from uam_control.setpoints.level_hold import HoldParameters
-from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.level_hold import HoldParameters, follow_thrust
+from uam_control.setpoints.loop_delay import DelayNumbers
+from uam_control.setpoints.rate_thrust_map import (
+    RateThrustMap,
+    RateThrustParameters,
+    rate_thrust_of_state,
+    use_factor,
+)
 from uam_control.setpoints.setpoint_source import (
     Setpoint,
     SetpointSource,
@@ -33,10 +41,17 @@ from uam_control.setpoints.setpoint_source import (
     silent,
 )
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
-from uam_control.stages.autopilot_port import AutopilotPort
+from uam_control.stages.autopilot_port import AutopilotPort, PortSteps
 from uam_control.stages.autopilot_report import AutopilotReport, AutopilotReports
-from uam_control.stages.flight_measurements import FlightMeasurements
-from uam_control.stages.vision_pacing import VisionPacing, VisionParameters
+from uam_control.stages.flight_measurements import FlightMeasurements, MeasurementArrays, measure
+from uam_control.stages.step import ASK, DECIDE, DONE
+from uam_control.stages.supervisor_inputs import LIFT, keep
+from uam_control.stages.vision_pacing import (
+    VisionArrays,
+    VisionPacing,
+    VisionParameters,
+    pose_due,
+)
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 
@@ -71,18 +86,37 @@ LIFT_PERIOD = 100_000_000  # [ns] between two reports of thrust factor and lift
 LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
 
 
+class BridgeArrays(NamedTuple):
+    """State of a `BridgeStage`. Of the map, rates (3,) [rad/s, FLU]: its output, curve: of its
+    thrust; of the measurements and the poses; memories (1,) of level hold, sequence, reports and
+    bridge; sent (4,)."""
+
+    map: np.ndarray
+    flat: np.ndarray
+    rates: np.ndarray
+    curve: tuple[float, float, float, float]
+    measured: MeasurementArrays
+    delay_numbers: DelayNumbers
+    vision: VisionArrays
+    hold: np.ndarray
+    sequence: np.ndarray
+    reports: np.ndarray
+    bridge: np.ndarray
+    sent: np.ndarray
+
+
 class BridgeStage:
     """The bridge between control laws and autopilot. All stamps in [ns].
 
     `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
     they are returned, and the autopilot gets none of them.
-    `sent`: body rates (3,) [rad/s, FLU] and thrust of the last setpoint, see `sent`;
+    `sent` (4,): body rates [rad/s, FLU] and thrust of the last setpoint, see `sent`;
     `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by that factor, at
     LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the report of the
     autopilot due after the last tick, None if none is due; `last` [ns]: stamp of the last tick.
     """
 
-    factor, lift_due, last = Number(), Flag(), Number()
+    factor, lift_due, last, _compiled = Number(), Flag(), Number(), Flag()
 
     def __init__(
         self,
@@ -111,9 +145,10 @@ class BridgeStage:
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
         self.hands = False
-        self.memory = record("last lift_due", "factor")  # last [ns]: stamp of the last tick
+        # last [ns]: stamp of the last tick; compiled: whether compiled ticks were the last ones
+        self.memory, self.sent = record("last lift_due compiled", "factor"), np.zeros(4)
         self.factor = 1.0
-        self.sent = sent(None)
+        self._note_sent(None)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Handle a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
@@ -189,7 +224,7 @@ class BridgeStage:
             now, state, flying, tau_p, tau_q, attitude, situation, reference
         )
         setpoint = self._sampled(now, setpoint, flying)
-        self.sent = rates, thrust = sent(setpoint)
+        rates, thrust = self._note_sent(setpoint)
         self._send(now, setpoint)
         airborne = flying and situation.armed
         self.factor = factor = self.map.thrust_factor
@@ -228,14 +263,34 @@ class BridgeStage:
             and self.reports.settled(self.last)
         )
 
-    def resume(self, stamp: int, state: np.ndarray, rates: np.ndarray, thrust: float) -> None:
-        """Go on after compiled ticks, the last one at `stamp` [ns] with state (3, 6 + n).
+    def resume(self, stamp: int, state: np.ndarray) -> AutopilotReport | None:
+        """Go on after compiled ticks; stamp [ns], state (3, 6 + n): the newest.
 
-        rates (3,) [rad/s, FLU], thrust: of its setpoint.
+        Returns the report that is due after the last of them, None without it or without ticks.
         """
+        if not self._compiled:
+            return None
+        self._compiled = False
         self.note_state(stamp, state)
-        self._kept = AttitudeTarget.of_rates(swap_body(rates), thrust)
-        self.sent = sent(self._kept)
+        self._kept = AttitudeTarget.of_rates(swap_body(self.sent[:3]), self.sent.item(3))
+        self.report = self.reports.due(self.last)
+        return self.report
+
+    @property
+    def arrays(self) -> BridgeArrays:
+        """What compiled ticks use."""
+        measured, source, mapping = self.measurements, self.source, self.map
+        return BridgeArrays(
+            *(mapping.memory, mapping.flat, mapping.rates, mapping.curve),
+            *(measured.arrays, self.loop_delay.numbers, self.vision.arrays),
+            *(source.hold.memory, self.sequence.memory, self.reports.memory),
+            *(self.memory, self.sent),
+        )
+
+    def _note_sent(self, setpoint: Setpoint) -> tuple[np.ndarray, float]:
+        rates, thrust = sent(setpoint)
+        self.sent[:3], self.sent[3] = rates, thrust
+        return rates, thrust
 
     @property
     def kept(self) -> Setpoint:
@@ -261,7 +316,7 @@ class BridgeStage:
         now, self._kept = stamp / SECOND, None
         self.loop_delay.pause()
         setpoint = self.source.without(now, self._situation)
-        self.sent = sent(setpoint)
+        self._note_sent(setpoint)
         self._send(now, setpoint)
         self.report = self.reports.due(stamp)
         self.factor = self.map.thrust_factor
@@ -278,3 +333,51 @@ class BridgeStage:
         if setpoint is not None and self.sequence.streaming and not self._dry_run:
             autopilot.send_setpoint(setpoint, now)
             self.sequence.streamed(now)
+
+
+@cache
+def sending(port: PortSteps) -> Callable[[tuple], int]:
+    """Return the compiled step of `control_tick.send_setpoint` to a port, in flight with rates."""
+    ready, poll, send_vision, send_setpoint = port
+
+    @borrowing
+    def send(arrays: tuple) -> int:
+        s, a, to, inputs = arrays
+        m, sequence, rates, stamp = a.bridge[0], a.sequence[0], a.rates, s.numbers[0].stamp
+        now = stamp / SECOND
+        if now - sequence.streamed > LINK_GAP or not ready(to, now):
+            return DECIDE
+        thrust = rate_thrust_of_state(s.tau_p, s.tau_q, s.state, a.flat, rates)
+        if thrust < 0.0 or not math.isfinite(thrust + rates[0] + rates[1] + rates[2]):
+            return DECIDE
+        poll(to, now)
+        follow_thrust(a.hold, now, thrust, s.attitude_reference[0, 2], True)
+        if pose_due(a.vision, now, s.state, True):
+            send_vision(to, a.vision.numbers[0].exposed, a.vision.pose)
+        send_setpoint(to, now, rates, thrust)
+        sequence.streamed = now
+        sequence.time = now
+        put(rates, a.sent[:3])
+        a.sent[3] = thrust
+        m.factor = factor = a.map[0].factor
+        step = min(max(stamp - m.last, 0) / SECOND, LONGEST_STEP)
+        found = measure(
+            *(now, step, s.state, rates, thrust, True, True, factor, a.curve),
+            *(a.measured, a.delay_numbers),
+        )
+        if found != factor:
+            use_factor(a.map, a.flat, found)
+        if stamp // LIFT_PERIOD != m.last // LIFT_PERIOD:
+            keep(inputs, LIFT, stamp, a.measured.lift)
+        m.last = stamp
+        m.compiled = True
+        return DONE
+
+    return send
+
+
+@borrowing
+def unreported(a: tuple) -> int:
+    """Return DONE until the last tick has a report; a: `BridgeArrays` alone."""
+    (bridge,) = a
+    return DONE if bridge.bridge[0].last < bridge.reports[0].due else ASK

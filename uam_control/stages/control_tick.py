@@ -7,76 +7,37 @@ a flight over ROS each stage runs in a node of its own, and the signals are topi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import ARM, POSITION, coordinates
+from uam_control.coordinates import ARM, POSITION
+from uam_control.estimation.estimator import write_biases
+from uam_control.maths.compiled import borrowing, counts_references
+from uam_control.maths.memory import put
 from uam_control.mission import Mission, Scenario, StartParameters
-from uam_control.setpoints.setpoint_source import Setpoint
+from uam_control.mission.nominal_tick import watch_due
 from uam_control.settings.parameter_set import ParameterSet
+from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
 from uam_control.stages.autopilot_report import AutopilotReport
-from uam_control.stages.bridge_stage import BridgeStage
-from uam_control.stages.estimator_stage import estimator_stage
-from uam_control.stages.law_stages import LawStage, MeasuredDelay
+from uam_control.stages.bridge_stage import BridgeStage, sending
+from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.law_stages import (
+    LawStage,
+    MeasuredDelay,
+    arm_step,
+    attitude_step,
+    position_step,
+)
 from uam_control.stages.mission_stage import MissionStage
+from uam_control.stages.signals import IMU, JOINTS, MOCAP, PAYLOAD, Imu, Joints, Pose, Signals
+from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, Stage, Step
+from uam_control.stages.supervisor_inputs import BIAS, GAINS, LIFT, keep, read_inputs
 from uam_control.stages.timing import Timing
+from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
 from uam_control.vehicle import VehicleDescription
-
-Pose = tuple[int, np.ndarray, np.ndarray]  # stamp [ns], position (3,) [m], quaternion [w x y z]
-Joints = tuple[int, np.ndarray, np.ndarray, np.ndarray]  # stamp, angles, speeds, efforts (n,)
-Imu = tuple[int, np.ndarray, np.ndarray]  # stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]
-
-
-@dataclass
-class Signals:
-    """The signals between the stages at one tick. The next tick overwrites the same arrays.
-
-    SIZE is 6 + n for an arm of n joints.
-    """
-
-    # estimator
-    state: np.ndarray  # (3, SIZE) chi, chi_dot, chi_ddot, see `coordinates`
-    # mission
-    reference: np.ndarray  # (3, SIZE) chi_d, chi_d_dot, chi_d_ddot
-    # laws
-    tau_alpha: np.ndarray  # (n,) [N m]
-    arm_command: np.ndarray  # (n,) see `ArmController.command`
-    tau_p: np.ndarray  # (3,) [N, ENU]
-    attitude_reference: np.ndarray  # (3, 3) rows q_d [rad], Omega_d, Omega_d_dot, FLU
-    tau_q: np.ndarray  # (3,) [N m, FLU]
-    # samples that arrived at this tick
-    mocap: Pose | None = None
-    joints: Joints | None = None
-    imu: Imu | None = None
-    payload: Pose | None = None
-    stamp: int = -1  # [ns] of the IMU sample; names the tick
-    # mission
-    flying: bool = False  # whether position and attitude are controlled
-    magnet: bool = False
-    time: float = -1.0  # [s] since take-off, negative before
-    phase: str = ""
-    # bridge
-    setpoint: Setpoint = None  # as sent to the autopilot; None: no setpoint was sent
-    thrust_factor: float = 1.0  # used for the setpoint
-
-    @classmethod
-    def at_rest(cls, joints: int) -> Self:
-        """Return the signals before the first tick: everything zero."""
-        size = len(coordinates(joints))
-        return cls(
-            state=np.zeros((3, size)),
-            reference=np.zeros((3, size)),
-            tau_alpha=np.zeros(joints),
-            arm_command=np.zeros(joints),
-            tau_p=np.zeros(3),
-            attitude_reference=np.zeros((3, 3)),
-            tau_q=np.zeros(3),
-        )
 
 
 class ControlTick:
@@ -95,10 +56,9 @@ class ControlTick:
     ) -> None:
         """sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
         begin of the reference is compared with, if given."""
-        self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
         estimator, joints = sets["state_estimator"], len(scenario.arm_start)
-        self.estimator = estimator_stage(estimator, joints, timing.control_period)
+        self.estimator = estimator_stage.estimator_stage(estimator, joints, timing.control_period)
         start = StartParameters(auto_start=True)
         mission = Mission(scenario, sets["mission"], start, vehicle, compared=True)
         self.mission = MissionStage(mission, timing)
@@ -107,14 +67,19 @@ class ControlTick:
         self.measured_delay = MeasuredDelay(self.attitude.controller)
         self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
         self.bridge = bridge
-        self.level = np.zeros((3, 3))  # attitude reference while there is none
         self.laws: dict[str, LawStage] = {
             "position": self.position,
             "attitude": self.attitude,
             "arm": self.arm,
         }
-        self.signals.arm_command = self.arm.controller.command
-        self._told: tuple | None = None  # what the bridge has of the mission
+        laws = [one.controller.arrays.all for one in self.laws.values()]
+        command, taus = self.arm.controller.command, tuple(one.tau for one in laws)
+        self.signals = Signals.at_rest(self.estimator.state, command, taus)
+        self.arrays = self.signals.arrays()
+        self.biases = np.zeros((2, 3))
+        names = [one.controller.names for one in self.laws.values()]
+        self.mission.inputs.share(joints, names)
+        self.told: tuple | None = None  # what the bridge has of the mission
 
     def tick(
         self,
@@ -135,30 +100,29 @@ class ControlTick:
 
     def go_on(self, first: int) -> bool:
         """Run the stages from number `first` on; return whether the last one was reached."""
-        for _, stage in self.stages[first:]:
-            if not stage(self):
-                return False
-        return True
+        return all(stage.run(self) for stage in self.stages[first:])
 
-    def insert(self, before: str, name: str, stage: Stage) -> None:
-        """Insert a stage before the stage `before`; raises ValueError if it does not exist."""
-        names = [name for name, _ in self.stages]
-        self.stages.insert(names.index(before), (name, stage))
+    def insert(
+        self, before: str, name: str, run: Callable[[ControlTick], bool], decides: bool = True
+    ) -> None:
+        """Insert a stage before the stage `before`; raises ValueError if it does not exist.
 
-
-Stage = Callable[[ControlTick], bool]  # returns whether the tick goes on
+        run, decides: see `Stage`.
+        """
+        names = [stage.name for stage in self.stages]
+        self.stages.insert(names.index(before), Stage(name, run, decides=decides))
 
 
 def listen(tick: ControlTick) -> bool:
     """mocap, joints, payload → the supervisor's inputs; mocap → the autopilot's estimator."""
     s, inputs = tick.signals, tick.mission.inputs
     if s.mocap is not None:
-        inputs.keep("mocap", inputs.mocap, s.mocap)
+        inputs.put(supervisor_inputs.MOCAP, *s.mocap)
         tick.bridge.mocap(*s.mocap)
     if s.joints is not None:
-        inputs.keep("joints", inputs.joints, s.joints)
+        inputs.put(supervisor_inputs.JOINTS, s.joints[0], s.joints[3])
     if s.payload is not None:
-        inputs.keep("payload", inputs.payload, s.payload)
+        inputs.put(supervisor_inputs.PAYLOAD, *s.payload[:2])
     return True
 
 
@@ -174,9 +138,7 @@ def estimate(tick: ControlTick) -> bool:
         return False
     s.stamp, s.state = estimator.stamp, state
     if estimator.bias_due:
-        inputs = tick.mission.inputs
-        message = s.stamp / SECOND, estimator.estimator.imu_bias[1]
-        inputs.keep("IMU bias", inputs.inputs.accelerometer_bias, message, s.stamp)
+        tick.biases[:] = estimator.estimator.imu_bias
     return True
 
 
@@ -184,6 +146,8 @@ def fly_mission(tick: ControlTick) -> bool:
     """state, the autopilot's last report → reference, flying, magnet; arming."""
     s, mission = tick.signals, tick.mission
     mission.begin(s.stamp, s.state)
+    if tick.estimator.bias_due:  # like every result of a tick, it is read at a later one
+        mission.inputs.put(BIAS, s.stamp, tick.biases[1])
     output = mission.output
     # a copy, as `look_ahead` writes the next one; on the ground only the arm has a reference
     if mission.flying:
@@ -193,8 +157,8 @@ def fly_mission(tick: ControlTick) -> bool:
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = mission.time, output.phase
     told = output.arm, output.magnet, output.state is State.FAILSAFE, output.regains
-    if told != tick._told:
-        tick._told = told
+    if told != tick.told:
+        tick.told = told
         tick.bridge.arm(output.arm)
         tick.bridge.mission(s.stamp, *told[1:])
     return True
@@ -204,9 +168,9 @@ def control_position(tick: ControlTick) -> bool:
     """state, reference → tau_p, attitude reference."""
     s, stage = tick.signals, tick.position
     s.tau_p = stage.update(s.stamp, s.state, s.reference, s.flying)
-    s.attitude_reference = stage.controller.attitude_reference if s.flying else tick.level
+    s.attitude_reference[:] = stage.controller.attitude_reference if s.flying else 0.0
     if stage.gains_due:
-        _keep_gains(tick, "position", stage)
+        tick.mission.inputs.put(GAINS, s.stamp, stage.controller.adaptation)
     return True
 
 
@@ -216,7 +180,7 @@ def control_attitude(tick: ControlTick) -> bool:
     tick.measured_delay.apply(s.stamp)
     s.tau_q = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
     if stage.gains_due:
-        _keep_gains(tick, "attitude", stage)
+        tick.mission.inputs.put(GAINS + 1, s.stamp, stage.controller.adaptation)
     return True
 
 
@@ -225,7 +189,7 @@ def control_arm(tick: ControlTick) -> bool:
     s, stage = tick.signals, tick.arm
     s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
     if stage.gains_due:
-        _keep_gains(tick, "arm", stage)
+        tick.mission.inputs.put(GAINS + 2, s.stamp, stage.controller.adaptation)
     return True
 
 
@@ -239,12 +203,10 @@ def send_setpoint(tick: ControlTick) -> bool:
     s.setpoint = bridge.tick(
         s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference, reference
     )
-    s.thrust_factor, report = bridge.factor, bridge.report
     if bridge.lift_due:
-        inputs = tick.mission.inputs
-        inputs.keep("lift", inputs.inputs.lift, (bridge.lift,), s.stamp)
-    if report is not None:
-        take_report(tick, report)
+        tick.mission.inputs.put(LIFT, s.stamp, (bridge.lift,))
+    if bridge.report is not None:
+        take_report(tick, bridge.report)
     return True
 
 
@@ -270,21 +232,122 @@ def look_ahead(tick: ControlTick) -> bool:
     return True
 
 
-def _keep_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> None:
-    """Adapted gains → the supervisor's inputs."""
-    inputs, law = tick.mission.inputs, stage.controller
-    stamp, gains = tick.signals.stamp, law.adaptation.copy()
-    message = stamp / SECOND, subsystem, law.names, gains
-    inputs.keep(subsystem, inputs.inputs.gains, message, stamp)
+@borrowing
+def listen_step(a: tuple) -> int:
+    """See `listen`, of an armed vehicle."""
+    s, vision, seen, inputs = a
+    stamp = s.stamps[MOCAP]
+    if stamp >= 0:
+        exposed = stamp / SECOND
+        if take_pose(vision, exposed, s.pose[:3], s.pose[3:], True):
+            seen[0] = exposed
+            put(s.pose[3:], seen[1:])
+        keep(inputs, supervisor_inputs.MOCAP, stamp, s.pose)
+    if s.stamps[JOINTS] >= 0:
+        keep(inputs, supervisor_inputs.JOINTS, s.stamps[JOINTS], s.joints[2])
+    if s.stamps[PAYLOAD] >= 0:
+        keep(inputs, supervisor_inputs.PAYLOAD, s.stamps[PAYLOAD], s.payload)
+    return DONE
 
 
-STAGES: Sequence[tuple[str, Stage]] = (
-    ("listeners of the sensors", listen),
-    ("estimator", estimate),
-    ("mission", fly_mission),
-    ("position law", control_position),
-    ("attitude law", control_attitude),
-    ("arm law", control_arm),
-    ("bridge", send_setpoint),
-    ("next reference", look_ahead),
+@borrowing
+def estimate_step(a: tuple) -> int:
+    """See `estimate`."""
+    s, estimator, biases = a
+    if s.stamps[MOCAP] >= 0:
+        estimator_stage.take_pose(estimator, s.stamps[MOCAP], s.pose[:3], s.pose[3:])
+    if s.stamps[JOINTS] >= 0:
+        estimator_stage.take_readings(estimator, s.stamps[JOINTS], s.joints[0], s.joints[1])
+    stamp = s.stamps[IMU]
+    if stamp < 0:
+        return ENDED
+    if estimator_stage.take_sample(estimator, stamp, s.imu[0], s.imu[1]) != estimator_stage.STATE:
+        return ENDED
+    s.numbers[0].stamp = estimator.ticks[0].stamp
+    if estimator.numbers[0].bias_due:
+        write_biases(estimator.estimator.pose.memory, biases)
+    return DONE
+
+
+@borrowing
+def mission_step(a: tuple) -> int:
+    """See `fly_mission`."""
+    s, estimator, biases, inputs, mission = a
+    m = s.numbers[0]
+    if m.stamp != mission.numbers[0].ahead:
+        return DECIDE
+    read_inputs(inputs, m.stamp)
+    if estimator[0].bias_due:
+        keep(inputs, supervisor_inputs.BIAS, m.stamp, biases[1])
+    mission_stage.begin_tick(mission, m.stamp)
+    for row in range(len(s.reference)):
+        put(mission.mission.guidance.reference[row], s.reference[row])
+    m.time = mission.numbers[0].time
+    return DONE
+
+
+@borrowing
+def look_ahead_step(a: tuple) -> int:
+    """See `look_ahead`."""
+    s, inputs, mission = a
+    if not mission_stage.advance(mission, inputs.inputs.known, s.numbers[0].stamp, s.state):
+        return DECIDE
+    return ASK if watch_due(mission.mission) else DONE
+
+
+def _step(function: Callable, arrays: Callable[[ControlTick], tuple]) -> Callable:
+    """Return what makes the step of a tick: `function`, with these arrays."""
+    return lambda tick: Step(function, (tick.arrays, *arrays(tick)))
+
+
+def _law_step(make: Callable[[Callable], Callable], law: str) -> Callable:
+    """Return what makes the step of one of the laws: make(its own)."""
+
+    def step(tick: ControlTick) -> Step | None:
+        stage, further = tick.laws[law], ()
+        own, inputs = type(stage.controller.law).step, tick.mission.inputs.arrays
+        if stage is tick.attitude:
+            further = tick.measured_delay.arrays
+        arrays = tick.arrays, stage.controller.arrays, stage.memory, inputs, *further
+        return Step(make(own), arrays) if counts_references(own) else None
+
+    return step
+
+
+def _bridge_step(tick: ControlTick) -> Step | None:
+    bridge, port = tick.bridge, tick.bridge.autopilot
+    if not bridge.compiled or port.steps is None:
+        return None
+    arrays = tick.arrays, bridge.arrays, port.arrays, tick.mission.inputs.arrays
+    return Step(sending(port.steps), arrays)
+
+
+def _heard(tick: ControlTick) -> tuple:
+    return tick.bridge.vision.arrays, tick.bridge.source.seen, tick.mission.inputs.arrays
+
+
+def _estimate_step(tick: ControlTick) -> Step | None:
+    if type(tick.estimator) is not EstimatorStage:
+        return None
+    return Step(estimate_step, (tick.arrays, tick.estimator.arrays, tick.biases))
+
+
+def _flown(tick: ControlTick) -> tuple:
+    mission = tick.mission
+    return tick.estimator.memory, tick.biases, mission.inputs.arrays, mission.arrays
+
+
+def _ahead(tick: ControlTick) -> tuple:
+    return tick.mission.inputs.arrays, tick.mission.arrays
+
+
+STAGES: Sequence[Stage] = (
+    Stage("listeners of the sensors", listen, _step(listen_step, _heard)),
+    Stage("estimator", estimate, _estimate_step, decides=False),
+    Stage("mission", fly_mission, _step(mission_step, _flown)),
+    Stage("position law", control_position, _law_step(position_step, "position"), decides=False),
+    Stage("attitude law", control_attitude, _law_step(attitude_step, "attitude"), decides=False),
+    Stage("arm law", control_arm, _law_step(arm_step, "arm"), decides=False),
+    Stage("bridge", send_setpoint, _bridge_step),
+    Stage("next reference", look_ahead, _step(look_ahead_step, _ahead)),
 )

@@ -92,7 +92,8 @@ class EstimatorStage:
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
     `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
-    `StateEstimator.bias_known`; `diverged`: how often the estimate has, which then begins anew;
+    `StateEstimator.bias_known`; `state` (3, 6 + n): of the newest tick;
+    `diverged`: how often the estimate has, which then begins anew;
     `held_until` [ns]: without states since then; `arrays`: the whole state, never replaced.
     """
 
@@ -110,7 +111,7 @@ class EstimatorStage:
     def _share(self, joints: int) -> None:
         """Make `arrays`, and the functions of this stage on them."""
         self.arrays = a = StageArrays(self.estimator.arrays, *self._own)
-        self._state, *_ = arrays_of(a.estimator.memory)
+        self.state, *_ = arrays_of(a.estimator.memory)
         sample, angles = np.zeros(3), np.zeros(joints)
         self._pose = bound(take_pose, a, 0, sample, np.zeros(4))
         self._readings = bound(take_readings, a, 0, angles, angles)
@@ -151,7 +152,7 @@ class EstimatorStage:
         found = self._sample(stamp, gyro, force)
         if found == OLDER:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
-        return self._state if found == STATE else None
+        return self.state if found == STATE else None
 
 
 class PlainEstimatorStage(EstimatorStage):
@@ -159,8 +160,9 @@ class PlainEstimatorStage(EstimatorStage):
 
     def _share(self, joints: int) -> None:
         self.arrays = StageArrays(self.memory, *self._own)  # without those of the estimator
+        self.state = np.zeros((3, ALPHA + joints))
         self._begin = bound(begin_sample, self.arrays, 0)
-        self._judge = bound(judge, self.arrays, np.zeros((3, ALPHA + joints)))
+        self._judge = bound(judge, self.arrays, self.state)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """See `take_pose`."""
@@ -180,8 +182,8 @@ class PlainEstimatorStage(EstimatorStage):
         estimator.imu(self.stamp / SECOND, gyro, force)
         if not estimator.complete:
             return NONE
-        self._state = estimator.update()
-        judged = self._judge(self._state)
+        self.state[:] = estimator.update()
+        judged = self._judge(self.state)
         if judged == DIVERGED:
             estimator.forget()
         return judged

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
-from uam_control.control.around_law import predict_by
+from uam_control.control.around_law import (
+    ControllerArrays,
+    begin_attitude,
+    begin_law,
+    end_arm,
+    end_attitude,
+    end_position,
+    predict_by,
+)
 from uam_control.control.controllers import AttitudeController, Controller
-from uam_control.maths.compiled import borrowing, prepared
-from uam_control.maths.memory import Flag, record
+from uam_control.laws.law import LawInputs
+from uam_control.maths.compiled import borrowing, inlined, prepared
+from uam_control.maths.memory import Flag, put, record
+from uam_control.stages.step import DECIDE, DONE
+from uam_control.stages.supervisor_inputs import GAINS, StageArrays, keep
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 
@@ -17,6 +30,7 @@ REPORT_DELAY = 200_000_000  # [ns] after which a report of a tick has arrived at
 MOST_REPORTS = 256  # within that time
 GAINS_PERIOD = 20_000_000  # [ns] between two publications of the adapted gains
 NEVER = -(2**62)  # [ns] stamp before the first tick
+POSITION, ATTITUDE, ARM = range(3)  # numbers in SUBSYSTEMS
 
 
 class MeasuredDelay:
@@ -104,3 +118,78 @@ def step_to(stage: np.ndarray, stamp: int) -> float:
     if not 0 < step <= 10 * m.period:
         step = m.period
     return step / SECOND
+
+
+@cache
+def position_step(law: Callable) -> Callable[[tuple], int]:
+    """Return the compiled step of `control_tick.control_position` with the step of a law."""
+
+    @borrowing
+    def control(a: tuple) -> int:
+        s, p, stage, inputs = a
+        if not p.all.numbers[0].flying:
+            return DECIDE
+        dt = step_to(stage, s.numbers[0].stamp)
+        begin_law(p.all, s.state, s.reference, p.attitude, True)
+        law(p.all.law.record, given(p.all, dt), p.all.law.adaptation, p.all.law.tau)
+        end_position(p, s.reference, dt)
+        for row in range(3):
+            put(p.attitude[row], s.attitude_reference[row])
+        keep_gains(stage, inputs, POSITION, s.numbers[0].stamp, p.all.law.adaptation)
+        return DONE
+
+    return control
+
+
+@cache
+def attitude_step(law: Callable) -> Callable[[tuple], int]:
+    """Return the compiled step of `control_tick.control_attitude` with the step of a law."""
+
+    @borrowing
+    def control(a: tuple) -> int:
+        s, q, stage, inputs, delay, reports, prediction = a
+        if not q.all.numbers[0].flying:
+            return DECIDE
+        stamp = s.numbers[0].stamp
+        apply_reports(delay, reports, prediction, stamp)
+        dt = step_to(stage, stamp)
+        begin_attitude(q, s.state, s.reference, s.attitude_reference, dt)
+        law(q.all.law.record, given(q.all, dt), q.all.law.adaptation, q.all.law.tau)
+        end_attitude(q)
+        keep_gains(stage, inputs, ATTITUDE, stamp, q.all.law.adaptation)
+        return DONE
+
+    return control
+
+
+@cache
+def arm_step(law: Callable) -> Callable[[tuple], int]:
+    """Return the compiled step of `control_tick.control_arm`, in flight, with the step of a law."""
+
+    @borrowing
+    def control(a: tuple) -> int:
+        s, r, stage, inputs = a
+        dt = step_to(stage, s.numbers[0].stamp)
+        begin_law(r.all, s.state, s.reference, s.attitude_reference, True)
+        law(r.all.law.record, given(r.all, dt), r.all.law.adaptation, r.all.law.tau)
+        end_arm(r, s.state, s.reference, dt)
+        keep_gains(stage, inputs, ARM, s.numbers[0].stamp, r.all.law.adaptation)
+        return DONE
+
+    return control
+
+
+@inlined
+def given(a: ControllerArrays, dt: float) -> LawInputs:
+    """Return what the law gets after a step of dt [s]."""
+    m = a.numbers[0]
+    return LawInputs(*a.own, a.norms, m.saturated != 0, m.frozen != 0, dt)
+
+
+@borrowing
+def keep_gains(
+    stage: np.ndarray, inputs: StageArrays, law: int, stamp: int, gains: np.ndarray
+) -> None:
+    """Keep the gains of a law, by its number in SUBSYSTEMS, for the supervisor if they are due."""
+    if stage[0].gains_due:
+        keep(inputs, GAINS + law, stamp, gains)

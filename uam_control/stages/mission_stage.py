@@ -137,9 +137,10 @@ class MissionStage:
         if self.ahead != following or self._last != stamp:
             return False
         self.take_reports(following)
-        held = self._authority.released_to or self._authority.failed
+        by = self._authority
+        held = by.released_to or by.failed or by.lands or by.stopped
         known = self.flying and self._armed_since is not None and not (self._reports or held)
-        return known and self.mission.nominal
+        return known and self.inputs.settled and self.mission.nominal
 
     def look_ahead(self, most: int) -> int:
         """Make ready for at most `most` compiled ticks; return for how many."""

@@ -7,23 +7,54 @@ has no effect.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.ages import BRIDGED
-from uam_control.estimation.pose_clock import PoseClock
-from uam_control.maths.memory import Number, record
+from uam_control.estimation.pose_clock import PoseClock, counts
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
+from uam_control.maths.memory import Number, put, record
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
+from uam_control.supervision.inputs import (
+    SUBSYSTEMS,
+    InputArrays,
+    take_ages,
+    take_bias,
+    take_gains,
+    take_pose,
+)
 
 READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
 Kept = tuple[Callable[..., None], tuple, int]  # reader, its arguments, tick answered [ns]
+# messages of stages; GAINS: of the first of three laws
+MOCAP, JOINTS, PAYLOAD, BIAS, LIFT, GAINS = range(6)
+KINDS = GAINS + len(SUBSYSTEMS)
+
+
+class StageArrays(NamedTuple):
+    """Messages of stages, and the arrays of the inputs.
+
+    waits (KINDS,): whether a message of each kind is not read yet; at (KINDS,) [ns]: its stamp;
+    values (KINDS, m): of a pose position and quaternion, of the joints their efforts. watched:
+    places of the gains with a limit. clock, numbers (1,): of `SupervisorInputs`.
+    """
+
+    waits: np.ndarray
+    at: np.ndarray
+    values: np.ndarray
+    watched: tuple[np.ndarray, np.ndarray, np.ndarray]
+    inputs: InputArrays
+    clock: np.ndarray
+    numbers: np.ndarray
 
 
 class SupervisorInputs:
     """Keeps messages until the next reading; `readings`: of the last tick, see `Readings`;
-    `clock`: of the poses."""
+    `clock`: of the poses; `arrays`: what compiled functions use, None before `share`."""
 
     _read_at = Number()
 
@@ -33,6 +64,8 @@ class SupervisorInputs:
         self.readings = Readings()
         self.clock = PoseClock()
         self._kept: dict[str, list[Kept]] = {}
+        self._joints, self._names = 0, []
+        self.arrays: StageArrays | None = None
         self.memory = record("read_at")  # [ns] tick of the last reading
         self._read_at = -READ_PERIOD
 
@@ -46,20 +79,47 @@ class SupervisorInputs:
         # the one before it may be read at a tick that is too early for the newest
         self._kept[name] = [*before[-1:], (read, message, answers)]
 
-    def newest(self) -> dict[str, tuple]:
-        """Return the newest message of each name that is not read."""
-        return {name: messages[-1][1] for name, messages in self._kept.items()}
+    def share(self, joints: int, names: Sequence[Sequence[str]]) -> None:
+        """Make room for the messages of stages in this process, see `put`; joints: of the arm,
+        names: of the gains of each of SUBSYSTEMS."""
+        self._joints, self._names = joints, [tuple(own) for own in names]
+        self._arrange()
 
-    def forget(self) -> None:
-        """Forget the messages that are not read."""
-        self._kept.clear()
+    def _arrange(self) -> None:
+        self.inputs.expect(self._joints)
+        width = max(7, self._joints, *map(len, self._names))
+        kept = np.zeros(KINDS, dtype=np.bool_), np.zeros(KINDS, dtype=np.int64)
+        watched = tuple(map(self.inputs.watched, self._names))
+        self.arrays = StageArrays(
+            *(*kept, np.zeros((KINDS, width)), watched),
+            *(self.inputs.arrays, self.clock.memory, self.memory),
+        )
+        self._read = bound(read_messages, self.arrays, 0)
+
+    def put(self, kind: int, stamp: int, *values: np.ndarray) -> None:
+        """Keep the newest message of a stage in this process, of a kind from MOCAP on.
+
+        stamp [ns], values: see `StageArrays`; as `keep` does for any message.
+        """
+        kept, begin = self.arrays, 0
+        kept.waits[kind], kept.at[kind] = True, stamp
+        for part in values:
+            kept.values[kind, begin : begin + len(part)] = part
+            begin += len(part)
+
+    @property
+    def settled(self) -> bool:
+        """Whether only messages of stages wait, and no other value changes; see `Inputs`."""
+        return self.arrays is not None and not self._kept and self.inputs.settled
 
     def begin_anew(self) -> None:
         """Forget all values: stamps of a new simulation follow."""
         self.inputs.begin_anew()
         self.readings = Readings()
         self.clock = PoseClock()
-        self.forget()
+        self._kept.clear()
+        if self.arrays is not None:
+            self._arrange()
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z].
@@ -84,6 +144,8 @@ class SupervisorInputs:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
         if stamp - self._read_at >= READ_PERIOD or stamp < self._read_at:
             self._read_at = stamp
+            if self.arrays is not None:
+                self._read(stamp)
             kept, self._kept = self._kept, {}
             for name, messages in kept.items():
                 early = [one for one in messages if one[2] >= stamp]
@@ -94,3 +156,47 @@ class SupervisorInputs:
                     read(*message)
         self.readings = self.inputs.at(stamp / SECOND)
         return self.readings
+
+
+@borrowing
+def keep(a: StageArrays, kind: int, stamp: int, values: np.ndarray) -> None:
+    """See `SupervisorInputs.put`; of longer values the first count."""
+    a.waits[kind], a.at[kind] = True, stamp
+    for i in range(min(len(values), a.values.shape[1])):
+        a.values[kind, i] = values[i]
+
+
+@borrowing
+def read_inputs(a: StageArrays, stamp: int) -> None:
+    """Do what `SupervisorInputs.tick` does at `stamp` [ns] with the messages of stages alone."""
+    m = a.numbers[0]
+    if stamp - m.read_at >= READ_PERIOD:
+        m.read_at = stamp
+        read_messages(a, stamp)
+    a.inputs.readings[0].missed_ticks = 0.0
+    take_ages(a.inputs, stamp / SECOND)
+
+
+@borrowing
+def read_messages(a: StageArrays, stamp: int) -> None:
+    """Read the messages of stages, as `Inputs` does; stamp [ns]: of the reading."""
+    m, waits, at, values, inputs = a.inputs.numbers[0], a.waits, a.at, a.values, a.inputs
+    if waits[MOCAP]:
+        exposed = at[MOCAP] / SECOND
+        if counts(a.clock, exposed, stamp / SECOND, BRIDGED):
+            take_pose(inputs, exposed, values[MOCAP, :3], values[MOCAP, 3:7])
+    if waits[JOINTS]:
+        m.joints = at[JOINTS] / SECOND
+        put(values[JOINTS], inputs.known.effort)
+    if waits[PAYLOAD]:
+        m.payload = at[PAYLOAD] / SECOND
+        put(values[PAYLOAD], inputs.payload)
+    if waits[BIAS]:
+        take_bias(inputs, at[BIAS] / SECOND, values[BIAS, :3])
+    if waits[LIFT]:
+        inputs.readings[0].lift = values[LIFT, 0]
+    for i in range(len(a.watched)):
+        if waits[GAINS + i]:
+            take_gains(inputs, i, at[GAINS + i] / SECOND, values[GAINS + i], a.watched[i])
+    for kind in range(KINDS):
+        waits[kind] = False

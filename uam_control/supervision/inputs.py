@@ -88,10 +88,14 @@ class Inputs:
     def joints(self, stamp: float, effort: np.ndarray) -> None:
         """Store joint readings at `stamp` [s]; effort (n,): measured torques [N m]."""
         self.memory["joints"] = stamp
-        if len(effort) != len(self._readings.joint_effort):
-            self._readings.joint_effort = np.zeros(len(effort))
-            self._make_arrays(self.arrays.bias_mean, self.arrays.newest)
+        self.expect(len(effort))
         self._readings.joint_effort[:] = effort
+
+    def expect(self, joints: int) -> None:
+        """Make room for the torques of a number of joints, unknown at first."""
+        if joints != len(self._readings.joint_effort):
+            self._readings.joint_effort = np.full(joints, math.nan)
+            self._make_arrays(self.arrays.bias_mean, self.arrays.newest)
 
     def payload(self, stamp: float, position: np.ndarray) -> None:
         """Store the grip point (3,) [m, world] of the payload, exposed at `stamp` [s]."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from uam_control.ages import DISCONNECTED, age_by
 from uam_control.frames import swap_quaternion, swap_sample, swap_world
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, jit, prepared
 from uam_control.maths.memory import Flag, Number, record
 from uam_control.offboard.modes import MavResult, Severity
 from uam_control.offboard.sequence import (
@@ -27,7 +27,16 @@ from uam_control.offboard.sequence import (
 )
 from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.vision_pose import VisionPose
-from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
+from uam_control.stages.autopilot_port import PortSteps
+from uam_control.stages.step import DECIDE, DONE
+from uam_sim_bridge.autopilot.commander import take_setpoint
+from uam_sim_bridge.autopilot.core import (
+    Autopilot,
+    AutopilotStatus,
+    CycleArrays,
+    fly_rates,
+    take_vision,
+)
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
@@ -56,7 +65,18 @@ def at_once() -> float:
 # of them, newest message, newest setpoint that reached the autopilot, next regular reports, delays
 # of the last poll
 WHOLE = "heartbeat landed"
-REAL = "now period received_at delivered heartbeat_due landed_due late_to late_from"
+# time [s]: of the autopilot's next cycle
+REAL = "now period received_at delivered heartbeat_due landed_due late_to late_from time"
+
+
+class PortArrays(NamedTuple):
+    """State of a `JoinedAutopilot`. numbers (1,): see WHOLE, REAL; gyro, force (3,): newest sample,
+    FRD."""
+
+    numbers: np.ndarray
+    autopilot: CycleArrays
+    gyro: np.ndarray
+    force: np.ndarray
 
 
 class JoinedAutopilot(FlightState):
@@ -68,7 +88,7 @@ class JoinedAutopilot(FlightState):
 
     _heartbeat, _landed = Flag(), Flag()
     _now, _period, _received_at, _delivered = (Number() for _ in range(4))
-    _heartbeat_due, _landed_due = Number(), Number()
+    _heartbeat_due, _landed_due, time = (Number() for _ in range(3))
 
     def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
         """sequence: of the bridge; it receives answers and texts."""
@@ -77,17 +97,15 @@ class JoinedAutopilot(FlightState):
         self.motors = autopilot.motors
         self.landed = self.failsafe = self.killed = False
         self.memory = record(WHOLE, REAL)
-        self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0)
+        self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0, 0.0)
         self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
         self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
         self.late_from: Callable[[], float] = at_once  # [s] of a message of the autopilot
         self._outgoing: deque[tuple[float, Callable[[], None]]] = deque()  # due [s], delivers it
         self._incoming: deque[tuple[float, _Received]] = deque()
-        self.time = 0.0
-        self._sample: tuple[float, np.ndarray, np.ndarray] | None = None
-        self.own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
-        self._swap = prepared(swap_sample, *self.own_sample, *self.own_sample)
+        self._own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
+        self._swap = prepared(swap_sample, *self._own_sample, *self._own_sample)
         self._report = prepared(report, self.memory, 0.0)
         self._begin_poll = prepared(begin_poll, self.memory, 0.0)
         self._told: AutopilotStatus | None = None
@@ -101,10 +119,16 @@ class JoinedAutopilot(FlightState):
         return float(m.period + m.late_to + m.late_from) if known else None
 
     @property
-    def at_once(self) -> bool:
-        """Whether the link loses and delays no message."""
+    def steps(self) -> PortSteps | None:
+        """See `AutopilotPort`: only of a link that loses and delays no message."""
         link = self.passes, self.receives, self.late_to, self.late_from
-        return link == (always, always, at_once, at_once)
+        usual = type(self) is JoinedAutopilot and type(self.autopilot) is Autopilot
+        return STEPS if usual and link == (always, always, at_once, at_once) else None
+
+    @property
+    def arrays(self) -> PortArrays:
+        """What compiled ticks use."""
+        return PortArrays(self.memory, self.autopilot.arrays, *self._own_sample)
 
     @property
     def settled(self) -> bool:
@@ -220,22 +244,14 @@ class JoinedAutopilot(FlightState):
         self.autopilot.target(self.time, target)
         self._delivered = self._now
 
-    def imu(self) -> tuple[float, np.ndarray, np.ndarray] | None:
-        """Return the sample of the last cycle: time [s], gyro and specific force (3,), FLU.
-
-        None before the first cycle. Both clocks are the same: nothing is converted.
-        """
-        return self._sample
-
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.
 
         gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
-        own_gyro, own_force = self.own_sample
+        own_gyro, own_force = self._own_sample
         self._swap(gyro, force, own_gyro, own_force)
         motors = self.autopilot.update(time, own_gyro, own_force)
-        self._sample = time, gyro, force
         status = self.autopilot.status
         if status != self._told:
             self._told = status
@@ -267,3 +283,54 @@ def report(port: np.ndarray, time: float) -> None:
 def following(due: float, interval: float, time: float) -> float:
     """Return the time [s] of the report after the one due at `due`; as in `Telemetry.due`."""
     return due + interval if due + interval > time else time + interval
+
+
+@borrowing
+def ready(a: PortArrays, now: float) -> bool:
+    """See `PortSteps`."""
+    m = a.numbers[0]
+    silent = not (m.heartbeat or m.landed) and now - m.received_at > LINK_GAP
+    return not silent and now - m.delivered <= LINK_GAP
+
+
+@borrowing
+def poll(a: PortArrays, now: float) -> None:
+    """Do what `JoinedAutopilot.poll` does where no report brings a change."""
+    m = a.numbers[0]
+    begin_poll(a.numbers, now)
+    m.late_to = m.late_from = 0.0
+    if m.heartbeat or m.landed:
+        m.received_at, m.heartbeat, m.landed = now, 0, 0
+
+
+@jit
+def send_vision(a: PortArrays, exposed: float, pose: np.ndarray) -> None:
+    """See `PortSteps`."""
+    time = a.numbers[0].time
+    position, quaternion = swap_world(pose[:3]), swap_quaternion(pose[3:])
+    take_vision(time, position, quaternion, age_by(exposed, time), a.autopilot.estimator)
+
+
+@borrowing
+def send_setpoint(a: PortArrays, now: float, rates: np.ndarray, thrust: float) -> None:
+    """See `PortSteps`."""
+    m, setpoint = a.numbers[0], a.autopilot.setpoint
+    setpoint[0], setpoint[1], setpoint[2] = rates[0], -rates[1], -rates[2]
+    setpoint[3] = min(1.0, max(0.0, thrust))
+    take_setpoint(a.autopilot.commander, m.time)
+    m.delivered = now
+
+
+STEPS = PortSteps(ready, poll, send_vision, send_setpoint)
+
+
+@borrowing
+def cycle_step(arrays: tuple) -> int:
+    """Do what `JoinedAutopilot.update` does with the sample (2, 3), FLU, of the port's time."""
+    sample, a = arrays
+    time = a.numbers[0].time
+    swap_sample(sample[0], sample[1], a.gyro, a.force)
+    if not fly_rates(a.autopilot, time, a.gyro, a.force):
+        return DECIDE
+    report(a.numbers, time)
+    return DONE

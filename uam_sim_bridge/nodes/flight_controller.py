@@ -133,8 +133,8 @@ def steps(nodes: Sequence[UamNode]) -> list[Callable[[], None]]:
     process, *acting = nodes
     by_name = {node.get_name(): node for node in acting}
     found: list[Callable[[], None]] = []
-    for stage, _ in STAGES:
-        act = ACTS[stage]
+    for stage in STAGES:
+        act = ACTS[stage.name]
         if act is None:
             continue
         name, method = act

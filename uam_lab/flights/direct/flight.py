@@ -1,28 +1,25 @@
 """The direct engine: the objects of the nodes in one loop, without middleware and sockets.
 
 One pass of the loop is one control tick, in the order of a lockstep flight with ROS: sensors, the
-stages of `ControlTick`, autopilot, physics. Most passes are steady ticks, see `steady`.
+stages of `ControlTick`, autopilot, physics. Most passes are compiled, see `compiled_ticks`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
-from uam_control.stages.control_tick import ControlTick, Imu, Joints, Pose
+from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
+from uam_lab.flights.direct.compiled_ticks import CompiledTicks
 from uam_lab.flights.direct.record import TickRecorder
-from uam_lab.flights.direct.steady.places import AUTOPILOT, BLIND
-from uam_lab.records.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
+from uam_lab.records.results.timeseries import FlightTable, columns_of
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.autopilot.params import Parameters
@@ -30,13 +27,10 @@ from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.nodes.bridge_parameters import check_names
-from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
-
-if TYPE_CHECKING:
-    from uam_lab.flights.direct.steady.ticks import SteadyTicks
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 STILL = 1.0  # [s] without a state, from which on the reason of an end names it
@@ -79,28 +73,26 @@ class DirectFlight:
         timing = Timing(self.plant.period)
         self.control = ControlTick(scenario, sets, bridge, timing, described)
         if self._faults:
+            self.control.insert("bridge", "faults", self._update_faults, decides=False)
+        if self._faults and self._faults.link.timeline.all:
             self.autopilot.passes = self._faults.link.passes
             self.autopilot.receives = self._faults.link.receives
             self.autopilot.late_to = self._faults.link.late_to
             self.autopilot.late_from = self._faults.link.late_from
-            self.control.insert("bridge", "faults", self._update_faults)
         if network := SetpointDelay.of(vehicle.numbers["effects"], seed):
             usual, signals = self.autopilot.late_to, self.control.signals
             self.autopilot.late_to = lambda: usual() + network.at(signals.stamp / SECOND)
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
         self._complete = False  # every kind of sensor has delivered
-        laws, columns = self.control.laws, columns_of(described)
+        self.newest: tuple | None = None  # sample of the autopilot's IMU, see `Samples.hil`
         length = scenario.landing.end + 12.0
-        self.recording = FlightTable(int(length / self.plant.period), columns)
-        controllers = {name: laws[name].controller for name in SUBSYSTEMS}
+        self.recording = FlightTable(int(length / self.plant.period), columns_of(described))
         self.recorder = TickRecorder(
-            self.recording,
-            self.plant.truth_row,
-            [one.adaptation for one in controllers.values()],
-            [gain_columns(name, one.names, columns) for name, one in controllers.items()],
+            *(self.recording, self.plant.truth_row, self.control, self.autopilot.motors),
             self.plant.period,
         )
+        self.compiled = CompiledTicks(self)
 
     def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
         """Fly until mission and vehicle are at their end.
@@ -150,76 +142,69 @@ class DirectFlight:
         """The injected faults; see `faults.timeline.record`."""
         return self._faults.records if self._faults else []
 
-    @cached_property
-    def steady(self) -> SteadyTicks:
-        """The steady ticks of this flight."""
-        # here: a flight with nodes imports this module, and compiles none of it
-        from uam_lab.flights.direct.steady.ticks import SteadyTicks
-
-        return SteadyTicks(self)
-
     def advance(self, enough: int, most: int) -> None:
         """Fly at least one tick, and until `enough` are flown; at most `most`, which is not less.
 
         After `enough` it ends where it costs no time. Raises PhysicsError.
         """
-        if not self.steady.fly(min(enough, most), most):
+        if not self.compiled.fly(min(enough, most), most):
             self.tick()
 
     def tick(self) -> None:
         """One control period of the whole vehicle."""
-        plant, control = self.plant, self.control
-        now, magnet = plant.time, control.signals.magnet
-        samples = plant.observe(self.recorder.truth())
-        self.autopilot.time = now
-        self._record(now, magnet, control.tick(*self.delivered(samples)))
-        self._end_tick(samples.hil)
+        self.sense()
+        self.go_on(0)
 
-    def finish(self, stage: int, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
-        """Finish a tick that steady ticks have begun; stage: the first one that is left.
+    def sense(self) -> None:
+        """Take the samples of a tick, whose true values are recorded."""
+        plant, signals, recorder = self.plant, self.control.signals, self.recorder
+        recorder.begin(plant.time, signals.magnet)
+        self.autopilot.time = plant.time
+        samples = plant.observe(recorder.truth())
+        before, self.newest = self.newest, samples.hil
+        imu = before if self.autopilot_imu else samples.imu
+        self._deliver(samples.mocap, samples.joints, imu, samples.payload)
 
-        See `steady.places`; hil: as in `Samples`.
-        """
-        control, now, magnet = self.control, self.plant.time, self.control.signals.magnet
-        if stage == BLIND:
-            self._record(now, magnet, False)
-        elif stage < AUTOPILOT:
-            self._record(now, magnet, control.go_on(stage))
-        self._end_tick(hil)
+    def resume(self) -> None:
+        """Go on after compiled ticks that have sensed last."""
+        samples = self.plant.arrived()
+        self.newest = samples.hil
+        self._deliver(samples.mocap, samples.joints, samples.imu, samples.payload)
 
-    def _record(self, now: float, magnet: bool, whole: bool) -> None:
-        """Record the tick of `now` [s]; magnet: in force at its begin; whole: see `write`."""
-        control, motors, recorder = self.control, self.autopilot.motors, self.recorder
-        if whole:
-            recorder.write(now, motors, magnet, control.signals, control.bridge.sent)
+    def go_on(self, stage: int) -> None:
+        """Finish a tick from a number in `ControlTick.stages` on."""
+        if self.control.go_on(stage):
+            self.recorder.write(self.control.signals.phase)
         else:
-            recorder.write_blind(now, motors, magnet, self.mission.output.phase)
+            self.recorder.write_blind(self.mission.output.phase)
+        self.cycle()
+        self.push()
 
-    def _end_tick(self, hil: tuple[float, np.ndarray, np.ndarray]) -> None:
+    def cycle(self) -> None:
+        """Run the autopilot's cycle."""
+        self.autopilot.update(*self.newest)
+
+    def push(self) -> None:
+        """Advance the physics by the tick."""
         signals = self.control.signals
-        motors = self.autopilot.update(*hil)
-        self.plant.step(motors, signals.arm_command, signals.magnet)
+        self.plant.step(self.autopilot.motors, signals.arm_command, signals.magnet)
 
-    def delivered(
-        self, samples: Samples
-    ) -> tuple[Pose | None, Joints | None, Imu | None, Pose | None]:
-        """What the stages get of `samples`, with stamps [ns].
+    def _deliver(
+        self, mocap: tuple | None, joints: tuple | None, imu: tuple | None, payload: tuple | None
+    ) -> None:
+        """Give samples, see `Samples`, to the stages, with stamps [ns].
 
         As the plant's node does, nothing is delivered before every kind of sensor has.
         """
-        mocap, joints, payload = samples.mocap, samples.joints, samples.payload
-        imu = self.autopilot.imu() if self.autopilot_imu else samples.imu
+        signals, samples = self.control.signals, (mocap, joints, imu, payload)
         if not self._complete:
             self._complete = None not in (mocap, joints, imu)
-            for sample in filter(None, (mocap, joints, imu, samples.hil)):
+            for sample in filter(None, (*samples[:3], self.newest)):
                 check_arrays(sample[1:])
             if not self._complete:
-                return None, None, None, None
-        return (
-            mocap and (nanoseconds(mocap[0]), mocap[1], mocap[2]),
-            joints and (nanoseconds(joints[0]), joints[1], joints[2], joints[3]),
-            imu and (nanoseconds(imu[0]), imu[1], imu[2]),
-            payload and (nanoseconds(payload[0]), payload[1], payload[2]),
+                samples = (None,) * 4
+        signals.mocap, signals.joints, signals.imu, signals.payload = (
+            sample and (nanoseconds(sample[0]), *sample[1:]) for sample in samples
         )
 
     def _update_faults(self, control: ControlTick) -> bool:

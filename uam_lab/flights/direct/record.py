@@ -6,16 +6,19 @@ kept that long in a ring, so that a row has those of the moment of its sample.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import ROLL
-from uam_control.maths.compiled import jit, prepared
-from uam_control.stages.control_tick import Signals
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.kept_tuple import bound
+from uam_control.maths.memory import Number, record
+from uam_control.stages.control_tick import ControlTick
+from uam_control.stages.signals import SignalArrays
+from uam_control.stages.step import DONE
 from uam_control.stamps import SECOND
-from uam_lab.records.results.timeseries import Columns, FlightTable
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Columns, FlightTable, gain_columns
 from uam_sim_bridge.plant import TruthRow
 
 KEPT = 64  # ticks in the ring: a quarter of a second, more than any sample takes
@@ -62,90 +65,121 @@ class RowLayout(NamedTuple):
     gain_columns: tuple[np.ndarray, ...]
 
 
+# row: the next of the table. Ticks: first whose IMU sample has not arrived, the one after the
+# newest; lag of a sample [ticks]. Of the plant, at the begin of the tick: magnet, time [s]. period
+# [s]
+WHOLE, REAL = "row first following lag magnet", "time period"
+
+
+class RecordArrays(NamedTuple):
+    """table (rows, columns); ring (KEPT, ...): see `TickRecorder`; tau_alpha (n,); sent (4,),
+    bridge (1,): of `BridgeStage`; motors (rotors,): commands 0..1; numbers (1,): WHOLE, REAL."""
+
+    table: np.ndarray
+    ring: np.ndarray
+    layout: RowLayout
+    signals: SignalArrays
+    tau_alpha: np.ndarray
+    sent: np.ndarray
+    bridge: np.ndarray
+    motors: np.ndarray
+    numbers: np.ndarray
+
+
 class TickRecorder:
-    """Writes the ticks of a flight into `table`."""
+    """Writes the ticks of a flight into `table`; `arrays`: what compiled functions use.
+
+    The ring has true values and commands of the newest ticks, by the number of the tick.
+    """
+
+    _row, _first, _following, _lag = (Number() for _ in range(4))
 
     def __init__(
         self,
         table: FlightTable,
         truth: TruthRow,
-        gains: Sequence[np.ndarray],
-        gain_columns: Sequence[np.ndarray],
+        control: ControlTick,
+        motors: np.ndarray,
         period: float,
     ) -> None:
-        """truth: of the plant; gains, gain_columns: as in `RowLayout`; period [s] of the ticks."""
-        self.table = table
-        rotors = table.columns.rotors
-        places = Places.of(table.columns)
-        self._layout = RowLayout(places, truth, tuple(gains), tuple(gain_columns))
-        self._ring = np.full((KEPT, MOTORS + rotors + truth.width), np.nan)
-        self._truths = list(self._ring[:, MOTORS + rotors :])
-        self._period = period
-        self._first = self._next = 0  # ticks whose IMU sample has not arrived: first, last + 1
-        self._lag = 0  # ticks from an IMU sample to its arrival
-        self._write: Callable | None = None  # `record` for the types of the first row
+        """truth: of the plant; motors (rotors,): of the autopilot; period [s] of the ticks."""
+        self.table, columns = table, table.columns
+        laws = {name: control.laws[name].controller for name in SUBSYSTEMS}
+        layout = RowLayout(
+            Places.of(columns),
+            truth,
+            tuple(one.adaptation for one in laws.values()),
+            tuple(gain_columns(name, one.names, columns) for name, one in laws.items()),
+        )
+        ring = np.full((KEPT, MOTORS + columns.rotors + truth.width), np.nan)
+        self._truths = list(ring[:, MOTORS + columns.rotors :])
+        self.memory, bridge = record(WHOLE, REAL), control.bridge
+        self.memory["period"] = period
+        self.arrays = RecordArrays(
+            *(table.values, ring, layout, control.arrays, control.signals.tau_alpha),
+            *(bridge.sent, bridge.memory, motors, self.memory),
+        )
+        self._write = bound(write, self.arrays)
 
     def truth(self) -> np.ndarray:
         """Return the row for the true values of this tick, see `Plant.observe`."""
-        return self._truths[self._next % KEPT]
+        return self._truths[self._following % KEPT]
 
-    def write(
-        self,
-        time: float,
-        motors: np.ndarray,
-        magnet: bool,
-        signals: Signals,
-        sent: tuple[np.ndarray, float],
-    ) -> None:
-        """Write the row of a tick.
+    def begin(self, time: float, magnet: bool) -> None:
+        """Begin a tick at `time` [s] of the plant; magnet: the command in force."""
+        self.memory["time"], self.memory["magnet"] = time, magnet
 
-        time [s] of the plant; motors (rotors,) 0..1 and magnet: the commands in force at its
-        begin; sent: body rates (3,) [rad/s] and thrust of the setpoint.
-        """
-        table = self.table
-        number = table.next_number(signals.phase)
-        arguments = (
-            table.values,
-            number,
-            self._ring,
-            self._first,
-            self._next,
-            time,
-            motors,
-            float(magnet),
-            signals.stamp / SECOND - self._period / 2.0,
-            signals.time,
-            signals.state,
-            signals.reference,
-            signals.attitude_reference,
-            signals.tau_p,
-            signals.tau_q,
-            signals.tau_alpha,
-            sent[0],
-            sent[1],
-            signals.thrust_factor,
-            self._layout,
-        )
-        if self._write is None:
-            self._write = prepared(record, *arguments)
-        self._first = self._write(*arguments)
-        self._next += 1
-        self._lag = self._next - self._first
+    def write(self, phase: str) -> None:
+        """Write the row of a tick."""
+        self._next_row(phase)
+        self._write()
 
-    def write_blind(self, time: float, motors: np.ndarray, magnet: bool, phase: str) -> None:
+    def _next_row(self, phase: str) -> np.ndarray:
+        row = self.table.next_row(phase)
+        self.fit()
+        return row
+
+    def fit(self) -> None:
+        """Use the present values of the table, which grows."""
+        if self.table.values is not self.arrays.table:
+            self.arrays = self.arrays._replace(table=self.table.values)
+            self._write = bound(write, self.arrays)
+
+    def write_blind(self, phase: str) -> None:
         """Write the row of a tick without an IMU sample: the last row with the new true state.
 
-        Arguments as of `write`. There is no row before the first tick with a sample.
+        There is no row before the first tick with a sample.
         """
-        keep(self._ring[self._next % KEPT], time, motors, float(magnet))
-        self._next += 1
-        table = self.table
-        if table.count and self._next - self._first > self._lag:
-            row = table.next_row(phase)
+        a, table = self.arrays, self.table
+        time, magnet = self.memory["time"].item(), self.memory["magnet"].item()
+        keep(a.ring[self._following % KEPT], time, a.motors, float(magnet))
+        self._following += 1
+        if table.count and self._following - self._first > self._lag:
+            row = self._next_row(phase)
             row[:] = table.values[table.count - 2]
-            row[0] += self._period
-            write_truth(row, self._ring[self._first % KEPT], len(motors), self._layout)
+            row[0] += self.memory["period"].item()
+            write_truth(row, a.ring[self._first % KEPT], len(a.motors), a.layout)
             self._first += 1
+            self._row += 1
+
+    @property
+    def left(self) -> int:
+        """Number of ticks that the table has room for before it must grow."""
+        return len(self.table.values) - self._row
+
+    def resume(self, phase: str) -> None:
+        """Go on after compiled ticks, all in one phase."""
+        table, row = self.table, self._row
+        table.phases[table.count : row] = table.phase_names[phase]
+        table.count = row
+
+
+@borrowing
+def record_step(arrays: tuple) -> int:
+    """Write the row of a tick; arrays: `RecordArrays` alone."""
+    (a,) = arrays
+    write(a)
+    return DONE
 
 
 @jit
@@ -157,63 +191,44 @@ def keep(row: np.ndarray, time: float, motors: np.ndarray, magnet: float) -> Non
         row[MOTORS + i] = motors[i]
 
 
-@jit
-def record(
-    table: np.ndarray,
-    number: int,
-    ring: np.ndarray,
-    first: int,
-    newest: int,
-    now: float,
-    motors: np.ndarray,
-    magnet: float,
-    earliest: float,
-    time: float,
-    state: np.ndarray,
-    reference: np.ndarray,
-    attitude_reference: np.ndarray,
-    tau_p: np.ndarray,
-    tau_q: np.ndarray,
-    tau_alpha: np.ndarray,
-    rates: np.ndarray,
-    command: float,
-    factor: float,
-    layout: RowLayout,
-) -> int:
-    """Copy one tick into row `number` of the table (rows, columns).
+@borrowing
+def write(a: RecordArrays) -> None:
+    """Copy one tick into the next row of the table.
 
-    first, newest: numbers of the ticks that the ring (KEPT, ...) has: the first without a row, and
-    this one, begun at `now` [s] with the commands motors (rotors,) and magnet. Returns the number
-    after the tick that is written: the first one that is not before `earliest` [s], when the IMU
-    sample was taken. The reference of roll and pitch is the desired attitude of tau_p.
+    The true values are those of the first tick that is not before the IMU sample was taken. The
+    reference of roll and pitch is the desired attitude of tau_p.
     """
-    keep(ring[newest % len(ring)], now, motors, magnet)
-    first = max(first, newest + 1 - len(ring))
-    while first < newest and ring[first % len(ring), TIME] < earliest:
+    m, s, at, ring = a.numbers[0], a.signals, a.layout.at, a.ring
+    keep(ring[m.following % len(ring)], m.time, a.motors, float(m.magnet))
+    first = max(m.first, m.following + 1 - len(ring))
+    earliest = s.numbers[0].stamp / SECOND - m.period / 2.0
+    while first < m.following and ring[first % len(ring), TIME] < earliest:
         first += 1
-    row = table[number]
-    write_truth(row, ring[first % len(ring)], len(motors), layout)
-    at, gains, gain_columns = layout.at, layout.gains, layout.gain_columns
-    row[0] = time
-    size = state.shape[1]
+    row = a.table[m.row]
+    write_truth(row, ring[first % len(ring)], len(a.motors), a.layout)
+    row[0] = s.numbers[0].time
+    size = s.state.shape[1]
     for i in range(3):
         for j in range(size):
-            row[at.estimate + size * i + j] = state[i, j]
-            row[at.reference + size * i + j] = reference[i, j]
+            row[at.estimate + size * i + j] = s.state[i, j]
+            row[at.reference + size * i + j] = s.reference[i, j]
         for j in range(3):
-            row[at.reference + size * i + ROLL + j] = attitude_reference[i, j]
-        row[at.tau_p + i] = tau_p[i]
-        row[at.tau_q + i] = tau_q[i]
-        row[at.setpoint + i] = rates[i]
-    for i in range(len(tau_alpha)):
-        row[at.tau_alpha + i] = tau_alpha[i]
-    row[at.setpoint + 3] = command
+            row[at.reference + size * i + ROLL + j] = s.attitude_reference[i, j]
+        row[at.tau_p + i] = s.tau_p[i]
+        row[at.tau_q + i] = s.tau_q[i]
+    for i in range(len(a.tau_alpha)):
+        row[at.tau_alpha + i] = a.tau_alpha[i]
+    for i in range(4):
+        row[at.setpoint + i] = a.sent[i]
     for subsystem in range(3):
-        columns, values = gain_columns[subsystem], gains[subsystem]
+        columns, values = a.layout.gain_columns[subsystem], a.layout.gains[subsystem]
         for i in range(len(columns)):
             row[columns[i]] = values[i]
-    row[at.factor] = factor
-    return first + 1
+    row[at.factor] = a.bridge[0].factor
+    m.first = first + 1
+    m.following += 1
+    m.lag = m.following - m.first
+    m.row += 1
 
 
 @jit

@@ -23,15 +23,18 @@ from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.stages.bridge_stage import sending
+from uam_control.stages.law_stages import arm_step, attitude_step, position_step
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
+from uam_sim_bridge.autopilot.joined import STEPS
 from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
-STEADY = "uam_lab.flights.direct.steady."  # modules that only a direct flight imports
+DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
 STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"  # options of this module as a program
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
@@ -49,9 +52,9 @@ def compiled_functions() -> Iterator:
 def is_cold() -> bool:
     """Return whether a function of the control path is not compiled from its present source."""
     return not all(
-        function._cache.filled
+        _filled(function)
         for function in compiled_functions()
-        if not function.py_func.__module__.startswith(STEADY)  # see `prepare_direct`
+        if function.py_func.__module__ != DIRECT  # see `prepare_direct`
     )
 
 
@@ -73,26 +76,17 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
 def prepare_direct(
     say: Callable[[str], None] = lambda text: None, laws: Iterable[str] = (catalogue.DEFAULT,)
 ) -> None:
-    """Do what `prepare` does, and compile the steady ticks of the direct engine with `laws`."""
-    from uam_lab.flights.direct.steady.laws import control
-
+    """Do what `prepare` does, and compile the ticks of the direct engine with `laws`."""
     prepare(say)
     for law in laws:
-        if active() and not (
-            _filled(control((LAWS[law].step,) * 3)) and all(map(_filled, _steady()))
-        ):
+        made = (make(LAWS[law].step) for make in (position_step, attitude_step, arm_step))
+        direct = (one for one in compiled_functions() if one.py_func.__module__ == DIRECT)
+        if active() and not all(map(_filled, (*made, *direct, sending(STEPS)))):
             say(f"compiling the direct engine with {law} (once)")
             hover, vehicle = load_scenario("hover"), Vehicle.load()
             flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
             while flight.plant.tick < TICKS:
                 flight.advance(TICKS, TICKS)
-
-
-def _steady() -> Iterator:
-    """Yield the compiled functions of the steady ticks."""
-    import uam_lab.flights.direct.steady.ticks  # noqa: F401
-
-    yield from (one for one in compiled_functions() if one.py_func.__module__.startswith(STEADY))
 
 
 def _filled(function: Callable) -> bool:
@@ -106,12 +100,16 @@ def warm_up(laws: Iterable[str]) -> None:
         flight = _flight(law)
         for _ in range(TICKS):
             flight.tick()
+        if law == catalogue.DEFAULT:
+            flight.advance(TICKS, TICKS)
     _others()
 
 
 def _flight(law: str) -> DirectFlight:
     scenario = load_scenario("hover")
-    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
+    effects = presets.laboratory()
+    del effects["network_delay"]  # with it bridge and autopilot are plain Python
+    vehicle = Vehicle.load().changed({"effects": effects})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
     return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
 

@@ -23,6 +23,8 @@ class FlightState:
     The part of an `AutopilotPort` that both ports have; all times are those of the ticks [s].
     """
 
+    steps = None
+
     def __init__(self) -> None:
         self.mode = self.intended = Mode.UNKNOWN
         self.armed = False

@@ -1,4 +1,4 @@
-"""Steady ticks: a flight in compiled loops is the flight of the objects, bit for bit."""
+"""Compiled ticks: a flight in compiled loops is the flight of the objects, bit for bit."""
 
 from __future__ import annotations
 
@@ -27,11 +27,14 @@ GUSTS = {"wind": [1.0, 0.5, 0.0], "gust": 1.0}
 
 
 def flight(scenario="hover", law="modular", vehicle="s500_arm", payload=0.2, seed=1, **more):
-    """Return a flight; air: changes of the vehicle's; profile: names after that of the law."""
+    """Return a flight; air: changes of the vehicle's; effects: of the plant; profile: names after
+    that of the law."""
     described = load_description(vehicle)
     flown, profile = Vehicle.of(described), default_profile(law, described)
     if air := more.pop("air", None):
         flown = flown.changed({"air": {**flown.numbers["air"], **air}})
+    if effects := more.pop("effects", None):
+        flown = flown.changed({"effects": effects})
     if further := more.pop("profile", None):
         profile = load_profile("s500", further)
     return DirectFlight(load_scenario(scenario, described), profile, flown, payload, seed, **more)
@@ -48,16 +51,16 @@ def fly_objects(one, until):
         one.tick()
 
 
-def fly_steady(one, until):
-    """Fly to tick `until`, steady where it may be."""
+def fly_compiled(one, until):
+    """Fly to tick `until`, compiled where it may be."""
     while one.plant.tick < until and not over(one):
         one.advance(until - one.plant.tick, until - one.plant.tick)
 
 
-def assert_same(steady, objects):
+def assert_same(compiled, objects):
     """Assert that both have recorded and decided the same."""
-    found, expected = steady.recording, objects.recording
-    assert steady.plant.tick == objects.plant.tick
+    found, expected = compiled.recording, objects.recording
+    assert compiled.plant.tick == objects.plant.tick
     assert found.count == expected.count
     assert found.phase_names == expected.phase_names
     np.testing.assert_array_equal(found.phases[: found.count], expected.phases[: found.count])
@@ -67,9 +70,9 @@ def assert_same(steady, objects):
         row = different[0]
         names = np.array(found.columns.names)[rows[row].view(np.int64) != other[row].view(np.int64)]
         pytest.fail(f"row {row}, {rows[row, 0]:.3f} s: {', '.join(names[:5])}")
-    assert steady.mission.changes == objects.mission.changes
-    assert steady.mission.grasps == objects.mission.grasps
-    assert vars(steady.mission.output).keys() == vars(objects.mission.output).keys()
+    assert compiled.mission.changes == objects.mission.changes
+    assert compiled.mission.grasps == objects.mission.grasps
+    assert vars(compiled.mission.output).keys() == vars(objects.mission.output).keys()
 
 
 END = 100_000  # ticks: later than any end
@@ -90,12 +93,12 @@ END = 100_000  # ticks: later than any end
     ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
 )
 def test_a_flight_is_recorded_the_same(options, share):
-    steady, objects = flight(**options), flight(**options)
-    steady.run()
+    compiled, objects = flight(**options), flight(**options)
+    compiled.run()
     fly_objects(objects, END)
-    assert_same(steady, objects)
-    assert steady.mission.output.phase == "landed"
-    assert steady.steady.ticks > share * steady.plant.tick
+    assert_same(compiled, objects)
+    assert compiled.mission.output.phase == "landed"
+    assert compiled.compiled.ticks > share * compiled.plant.tick
 
 
 @settings(max_examples=6, deadline=None)
@@ -106,8 +109,8 @@ def test_a_flight_is_recorded_the_same(options, share):
 def test_it_may_change_between_both_at_any_tick(stretches, seed):
     mixed, objects = flight(seed=seed), flight(seed=seed)
     fly_objects(mixed, 600)  # in the air
-    for is_steady, ticks in stretches:
-        (fly_steady if is_steady else fly_objects)(mixed, mixed.plant.tick + ticks)
+    for is_compiled, ticks in stretches:
+        (fly_compiled if is_compiled else fly_objects)(mixed, mixed.plant.tick + ticks)
     fly_objects(objects, mixed.plant.tick)
     assert_same(mixed, objects)
 
@@ -184,28 +187,28 @@ def full_table(one):
     ],
 )
 def test_an_incident_is_the_same(change):
-    steady, objects = flight(), flight()
-    for one, fly in ((steady, fly_steady), (objects, fly_objects)):
+    compiled, objects = flight(), flight()
+    for one, fly in ((compiled, fly_compiled), (objects, fly_objects)):
         fly(one, 1501)
         assert one.mission.output.state is State.FLYING
         change(one)
         fly(one, 4000)
-    assert_same(steady, objects)
-    assert steady.steady.ticks > 800  # it was steady before
+    assert_same(compiled, objects)
+    assert compiled.compiled.ticks > 800  # it was compiled before
 
 
 def test_an_error_of_the_physics_has_its_text():
     one = flight()
-    fly_steady(one, 1501)
+    fly_compiled(one, 1501)
     one.plant.model.opt.integrator = 99
     with pytest.raises(PhysicsError, match="MuJoCo: mj_step: invalid integrator"):
-        fly_steady(one, 1600)
+        fly_compiled(one, 1600)
 
 
 def test_it_ends_at_the_tick_that_was_asked_for():
     one = flight()
     for tick in (700, 701, 703, 850, 1100):
-        fly_steady(one, tick)
+        fly_compiled(one, tick)
         assert one.plant.tick == tick
     one.advance(10, 1000)  # enough, most
     assert 1110 <= one.plant.tick <= 2100
@@ -214,32 +217,58 @@ def test_it_ends_at_the_tick_that_was_asked_for():
 @pytest.mark.parametrize(
     "options",
     [
-        {"faults": ["mocap_dropout@5+0.3"]},
+        {"faults": ["mocap_dropout@5+0.3", "imu_dropout@7+0.02"]},
+        {"faults": ["mavlink_delay@5+2"]},
         {"autopilot_imu": True},
         {"profile": "attitude_setpoints"},
+        {"effects": presets.laboratory()},
+        {"effects": presets.laboratory(), "faults": ["imu_bias@4+2"]},
     ],
-    ids=("faults", "autopilot's IMU", "other setpoints"),
+    ids=lambda options: "-".join(options),
 )
-def test_a_flight_of_another_kind_is_flown_by_the_objects(options):
+def test_a_part_in_python_splits_the_loop(options):
     if faults := options.get("faults"):
-        options = {"faults": read_schedule(faults, load_scenario("hover"), seed=1)}
-    one = flight(**options)
-    fly_steady(one, 1000)
-    assert not one.steady.able
-    assert one.steady.ticks == 0
+        options = options | {"faults": read_schedule(faults, load_scenario("hover"), seed=1)}
+    compiled, objects = flight(**options), flight(**options)
+    fly_compiled(compiled, 3000)
+    fly_objects(objects, 3000)
+    assert_same(compiled, objects)
+    assert compiled.compiled.ticks > 1500
 
 
-def test_effects_are_simulated_by_the_objects():
-    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
-    one = DirectFlight(load_scenario("hover"), load_profile("s500"), vehicle, 0.0, 1)
-    assert not one.steady.able
+@pytest.mark.parametrize("before", ["estimator", "position law", "next reference"])
+def test_a_stage_of_somebodys_own_sees_and_changes_what_it_does_without_compiled_ticks(before):
+    def stage(seen):
+        def run(control):
+            s = control.signals
+            if before == "estimator" and s.imu is not None:
+                s.imu = s.imu[0], s.imu[1] + 0.01, s.imu[2]
+            elif before == "position law":
+                s.reference[0, 1] += 0.02
+            seen.append((s.stamp, s.time, s.phase, s.tau_p.tolist(), repr(s.setpoint)))
+            return True
+
+        return run
+
+    found = [], []
+    compiled, objects = flight(), flight()
+    for one, seen in zip((compiled, objects), found, strict=True):
+        one.control.insert(before, "own", stage(seen))
+    fly_compiled(compiled, 1500)
+    fly_objects(objects, 1500)
+    assert_same(compiled, objects)
+    assert found[0] == found[1]
+    assert compiled.compiled.ticks > 500
 
 
-def test_a_law_of_somebodys_own_is_flown_by_the_objects(monkeypatch):
-    one = flight()
-    law = type(one.control.position.controller.law)
-    monkeypatch.setattr(law, "step", staticmethod(lambda *inputs: None))
-    assert not one.steady.able
+def test_a_law_of_somebodys_own_may_be_plain_python(monkeypatch):
+    law = type(flight().control.position.controller.law)
+    monkeypatch.setattr(law, "step", staticmethod(getattr(law.step, "py_func", law.step)))
+    compiled, objects = flight(), flight()
+    fly_compiled(compiled, 1200)
+    fly_objects(objects, 1200)
+    assert_same(compiled, objects)
+    assert compiled.compiled.ticks > 300
 
 
 @pytest.fixture
@@ -259,19 +288,19 @@ def allocations():
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="NUMBA_DISABLE_JIT: nothing is compiled")
 def test_no_memory_is_left_behind(allocations):
     one = flight()
-    fly_steady(one, 800)
+    fly_compiled(one, 800)
     before = allocations()
-    fly_steady(one, 2300)
+    fly_compiled(one, 2300)
     made, freed = allocations() - before
-    assert one.steady.ticks > 1000
+    assert one.compiled.ticks > 1000
     assert made == freed > 1000
 
 
 def test_a_flight_is_freed_with_its_last_reference():
     """Garbage collection alone would come late: a flight has megabytes, a campaign thousands."""
     one = flight()
-    fly_steady(one, 1000)
-    assert one.steady.ticks
+    fly_compiled(one, 1000)
+    assert one.compiled.ticks
     watched = weakref.ref(one)
     gc.disable()
     try:

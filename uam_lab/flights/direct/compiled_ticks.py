@@ -1,0 +1,344 @@
+"""Compiled ticks: the stages of a direct flight on their own memory, many ticks in one call.
+
+Most ticks of a flight only compute: no phase changes, no limit is near, nobody takes over. Python
+needs most of their time for the way from one compiled function to the next. Here the compiled steps
+of all stages, in the order of `ControlTick.stages`, with the sensors before them, recording,
+autopilot and physics behind them, are one loop.
+
+A step that has something to decide changes nothing, and says so. Then the loop ends there, and the
+objects do this stage and the rest of the tick. So all decisions are made by the objects, and a
+recording is the same bit for bit (tests/flights/test_compiled_ticks.py).
+
+A part of the tick without a compiled step (a fault, the effects of the laboratory, a law or a
+setpoint of somebody's own) splits the loop: Python goes from part to part, tick by tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from operator import is_
+from typing import Protocol
+from weakref import proxy
+
+import numpy as np
+
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.memory import put
+from uam_control.stages.bridge_stage import BridgeStage, unreported
+from uam_control.stages.control_tick import ControlTick, take_report
+from uam_control.stages.mission_stage import MissionStage
+from uam_control.stages.signals import IMU, JOINTS, MOCAP, NOTHING, PAYLOAD
+from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
+from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
+from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
+from uam_sim_bridge.plant import PhysicsError, Plant
+from uam_sim_bridge.plant.engine_step import error_text
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+from uam_sim_bridge.plant.plant_tick import sense, step
+from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE
+
+COMPILES = "compiling the direct engine for this law and vehicle (once)"
+LEAST = 2  # ticks for which the preparations are worth their time
+USUAL = {"mission": MissionStage, "bridge": BridgeStage}
+
+
+class Flight(Protocol):
+    """What the compiled ticks need of a `DirectFlight`; see there."""
+
+    plant: Plant
+    control: ControlTick
+    autopilot: JoinedAutopilot
+    autopilot_imu: bool
+    recorder: TickRecorder
+    say: Callable[[str], object]
+    newest: tuple[float, np.ndarray, np.ndarray]  # sample of the autopilot's IMU, see `Samples.hil`
+
+    def sense(self) -> None:
+        """Take the samples of a tick."""
+
+    def resume(self) -> None:
+        """Go on after compiled ticks that have sensed last."""
+
+    def go_on(self, stage: int) -> None:
+        """Finish a tick from a number in `ControlTick.stages` on."""
+
+    def cycle(self) -> None:
+        """Run the autopilot's cycle."""
+
+    def push(self) -> None:
+        """Advance the physics."""
+
+
+class CompiledTicks:
+    """Flies the compiled ticks of a flight; `ticks`: how many it has flown."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight, self.ticks = proxy(flight), 0  # the flight owns this object
+        self._sample = np.zeros((2, 3))  # of the autopilot's IMU: gyro, specific force, FLU
+        self._fault = np.zeros(1, dtype=np.int64)  # address of the text of MuJoCo's error
+        self._made: tuple = ()
+
+    def fly(self, enough: int, most: int) -> int:
+        """Fly until `enough` ticks are flown, at most `most`, while nothing is decided.
+
+        The objects finish the tick in which something is. Returns how many were flown, 0 for none.
+        Raises PhysicsError.
+        """
+        flown, end = 0, 0
+        while flown < enough and not end and self._nominal():
+            self._arrange()
+            count = self._renew(most - flown)
+            if count < LEAST:
+                break
+            done, end = self._stretch(count, enough - flown, most - flown)
+            flown += done
+            self.ticks += done
+        return flown + (end != 0)
+
+    def _nominal(self) -> bool:
+        """Return whether nothing is to be decided before a compiled step says so."""
+        flight, control = self._flight, self._flight.control
+        signals, mission = control.signals, control.mission
+        output = mission.output
+        told = output.arm, output.magnet, False, output.regains
+        usual = all(type(getattr(control, name)) is kind for name, kind in USUAL.items())
+        return (
+            signals.flying
+            and usual
+            and flight.autopilot.armed
+            and signals.phase == output.phase
+            and signals.magnet == output.magnet
+            and control.told == told
+            and mission.nominal(signals.stamp)
+            and (not self._joined or (control.bridge.settled and flight.autopilot.settled))
+            and not control.estimator.held_back
+        )
+
+    @property
+    def _joined(self) -> bool:
+        """Whether bridge and autopilot have compiled steps."""
+        return self._flight.autopilot.steps is not None and self._flight.control.bridge.compiled
+
+    def _arrange(self) -> None:
+        """Make the steps, if objects have changed since."""
+        flight, control = self._flight, self._flight.control
+        flight.recorder.fit()
+        made = (
+            *(one.controller.arrays for one in control.laws.values()),
+            *(type(one.controller.law).step for one in control.laws.values()),
+            *(control.mission.inputs.arrays, control.mission.mission.arrays),
+            *(control.bridge.map.curve, flight.autopilot.autopilot.arrays),
+            *(flight.autopilot.steps, flight.recorder.arrays),
+        )
+        if len(made) != len(self._made) or not all(map(is_, made, self._made)):
+            self._made = made
+            self._make()
+
+    def _make(self) -> None:
+        """Make the steps, and the loop over them."""
+        flight, control = self._flight, self._flight.control
+        names = [stage.name for stage in control.stages]
+        self._mission, self._bridge = 1 + names.index("mission"), 1 + names.index("bridge")
+        stages = [stage.step(control) for stage in control.stages]
+        steps = [None if None in stages[: self._mission] else self._sensors(), *stages]
+        self._record = len(steps)
+        steps += [Step(record_step, (flight.recorder.arrays,)), self._cycle(), self._physics()]
+        self._steps = Steps(steps, Step(unreported, (control.bridge.arrays,)))
+        left = zip(control.stages, stages, strict=True)
+        self._asks = any(stage.decides and step is None for stage, step in left)
+        runs = (partial(stage.run, control) for stage in control.stages)
+        # not the methods themselves: they hold the flight, which holds this object
+        around = lambda: flight.sense(), lambda: flight.cycle(), lambda: flight.push()
+        self._in_python = [around[0], *runs, None, *around[1:]]
+        self._loop, ready = None, True
+        if self._steps.whole:
+            self._loop, ready = self._steps.loop(self._record)
+        if not ready:
+            flight.say(COMPILES)
+
+    @property
+    def _compiled_plant(self) -> bool:
+        plant = self._flight.plant
+        return type(plant) is MujocoPlant and plant.compiled
+
+    def _sensors(self) -> Step | None:
+        flight, arrays = self._flight, self._flight.recorder.arrays
+        if not (self._compiled_plant and self._joined) or flight.autopilot_imu:
+            return None
+        of_tick = arrays.ring, arrays.motors, arrays.numbers, flight.autopilot.memory
+        return Step(sense_step, (flight.plant.arrays, arrays.signals, self._sample, *of_tick))
+
+    def _cycle(self) -> Step | None:
+        if not self._joined:
+            return None
+        return Step(cycle_step, (self._sample, self._flight.autopilot.arrays))
+
+    def _physics(self) -> Step | None:
+        flight, arrays = self._flight, self._flight.recorder.arrays
+        if not self._compiled_plant:
+            return None
+        command = flight.control.signals.arm_command
+        of_tick = arrays.motors, command, arrays.numbers, self._fault
+        return Step(push_step, (flight.plant.arrays, *of_tick))
+
+    def _stretch(self, count: int, enough: int, most: int) -> tuple[int, int]:
+        """Fly until `enough` ticks are flown, at most `most`; count: those made ready.
+
+        Returns how many ended, and whether the objects have ended a further one.
+        """
+        mission, flown, whole = self._flight.control.mission.mission, 0, True
+        self._flight.recorder.begin(0.0, self._flight.control.signals.magnet)
+        while True:
+            done, end = self._run(count - mission.looked_ahead, whole)
+            flown, whole = flown + done, True
+            if end > 0 and end % MANY == ASK and mission.watch():
+                whole = False
+            elif end or flown >= enough:
+                break
+            else:
+                self._take_report()
+                count = self._renew(most - flown) if self._nominal() else 0
+                if count < LEAST:
+                    break
+        self._resume()
+        if end:
+            self._finish(end)
+        return flown, end
+
+    def _renew(self, most: int) -> int:
+        """Make ready for at most `most` ticks; return for how many."""
+        control, plant = self._flight.control, self._flight.plant
+        if self._compiled_plant:
+            most = min(most, plant.draw_noise())
+        left = control.bridge.reports.next - control.signals.stamp
+        to_report = max(1, -(-left // control.mission.period))
+        return control.mission.look_ahead(min(most, self._flight.recorder.left, to_report))
+
+    def _take_report(self) -> None:
+        """Take the report of the last compiled tick, if it has one."""
+        control = self._flight.control
+        signals = control.signals
+        report = control.bridge.resume(signals.stamp, signals.state)
+        if report is not None:
+            take_report(control, report)
+
+    def _resume(self) -> None:
+        """Let the objects know what compiled ticks have done."""
+        flight, control = self._flight, self._flight.control
+        control.mission.resume(control.signals.state)
+        self._take_report()
+        control.signals.setpoint = control.bridge.kept
+        flight.recorder.resume(control.signals.phase)
+
+    def _finish(self, end: int) -> None:
+        """Let the objects finish the tick of a loop that ended in `end`, see `step.looped`."""
+        flight, place, outcome = self._flight, abs(end) // MANY, abs(end) % MANY
+        if self._steps.calls[0] is not None:
+            flight.resume()
+        if end > 0 and outcome == DECIDE:
+            flight.go_on(place - 1)
+            return
+        if end > 0 and outcome != ASK:
+            flight.recorder.write_blind(flight.control.mission.output.phase)
+        elif end > 0:
+            flight.recorder.write(flight.control.signals.phase)
+        if end > 0 or place == 1:
+            flight.cycle()
+        elif self._fault[0]:
+            raise PhysicsError(f"MuJoCo: {error_text(self._fault.item(0))}")
+        flight.push()
+
+    def _run(self, count: int, whole: bool) -> tuple[int, int]:
+        """Fly up to `count` ticks, see `step.looped`."""
+        return (self._loop or self._split)(count, whole)
+
+    def _split(self, count: int, whole: bool) -> tuple[int, int]:
+        """Fly as the compiled loop does, from part to part; see `step.looped`."""
+        done = 0
+        while count > 0 or not whole:
+            if whole and done and self._asks and not self._nominal():
+                break
+            count -= whole
+            end = self._half(0, self._record) if whole else 0
+            if end:
+                return done, end
+            end = self._half(self._record, len(self._in_python))
+            if end:
+                return done, -end
+            whole, done = True, done + 1
+            if self._steps.calls[-1]() != DONE:
+                break
+        return done, 0
+
+    def _half(self, begin: int, end: int) -> int:
+        """Do the parts from `begin` to `end`; return 0, or where it ended, see `step.chained`."""
+        for place in range(begin, end):
+            call = self._steps.calls[place]
+            outcome = call() if call is not None else self._do(place)
+            if outcome != DONE:
+                return outcome + MANY * (place - begin)
+        return 0
+
+    def _do(self, place: int) -> int:
+        """Do a part in Python."""
+        control = self._flight.control
+        if self._bridge < place < self._record:
+            self._take_report()
+            control.signals.setpoint = control.bridge.kept
+        goes_on = self._in_python[place]()
+        if place == 0:
+            self._sample[:] = self._flight.newest[1:]
+        if place < self._mission:
+            control.signals.put(control.arrays)
+        return ENDED if goes_on is False else DONE
+
+
+@borrowing
+def sense_step(arrays: tuple) -> int:
+    """Take the samples of a tick, as `DirectFlight.sense`."""
+    plant, s, sample, ring, motors, numbers, port = arrays
+    tick, m, mocap = numbers[0], plant.numbers[0], plant.mocap
+    tick.time = m.tick * m.period
+    port[0].time = tick.time
+    sense(plant, ring[tick.following % len(ring)][MOTORS + len(motors) :])
+    s.stamps[MOCAP] = NOTHING
+    s.stamps[PAYLOAD] = NOTHING
+    if mocap.arrived[VEHICLE_POSE] >= 0:
+        pose = mocap.poses[VEHICLE_POSE, mocap.arrived[VEHICLE_POSE]]
+        s.stamps[MOCAP] = stamp_of(pose[0])
+        put(pose[1:], s.pose)
+    if mocap.arrived[PAYLOAD_POSE] >= 0:
+        pose = mocap.poses[PAYLOAD_POSE, mocap.arrived[PAYLOAD_POSE]]
+        s.stamps[PAYLOAD] = stamp_of(pose[0])
+        put(pose[1:], s.payload)
+    taken, n = m.tick - m.joints_late, s.joints.shape[1]
+    s.stamps[JOINTS] = stamp_of(taken * m.period)
+    for i in range(3):
+        put(plant.samples[taken % len(plant.samples)][6 + i * n :], s.joints[i])
+    taken = m.tick - m.imu_late
+    s.stamps[IMU] = stamp_of(taken * m.period)
+    put_imu(plant.samples[taken % len(plant.samples)], s.imu)
+    put_imu(plant.samples[m.tick % len(plant.samples)], sample)
+    return DONE
+
+
+@borrowing
+def put_imu(row: np.ndarray, into: np.ndarray) -> None:
+    """Copy gyro and specific force from a row of the plant's samples to into (2, 3)."""
+    put(row, into[0])
+    put(row[3:], into[1])
+
+
+@jit
+def stamp_of(time: float) -> int:
+    """Return the stamp [ns] of a time [s]; see `nanoseconds`."""
+    return int(np.rint(time * 1e6)) * 1000
+
+
+@borrowing
+def push_step(arrays: tuple) -> int:
+    """Advance the physics by a tick, as `DirectFlight.push`; DECIDE: of an error."""
+    plant, motors, command, numbers, fault = arrays
+    fault[0] = step(plant, motors, command, numbers[0].magnet != 0)
+    return DECIDE if fault[0] else DONE
