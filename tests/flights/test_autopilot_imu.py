@@ -14,34 +14,36 @@ from uam_sim_bridge.plant import Vehicle
 
 RMS = ("position_m", "attitude_deg", "arm_deg")
 PERIOD = 0.004  # [s]
-JITTER = 0.001  # [s] as TIMESYNC over a slow link
+JITTER = 1_000_000  # [ns] as TIMESYNC over a slow link
 
 
-class Jittered:
-    """The samples of an autopilot's IMU with jitter of the stamps, 1 % repeated and 1 % missing."""
+def jittered():
+    """A stage: jitter of the stamps of the IMU's samples, 1 % repeated and 1 % missing."""
+    random, last = np.random.default_rng(5), None
 
-    def __init__(self, imu):
-        self._imu, self._random, self._last = imu, np.random.default_rng(5), None
+    def stage(control):
+        nonlocal last
+        late, repeated, missing = random.random(3)
+        signals = control.signals
+        if signals.imu is None or missing < 0.01:
+            signals.imu = None
+            return True
+        if repeated >= 0.01 or last is None:
+            stamp, gyro, force = signals.imu
+            last = stamp + round(JITTER * (2.0 * late - 1.0)), gyro, force
+        signals.imu = last
+        return True
 
-    def __call__(self):
-        late, repeated, missing = self._random.random(3)
-        sample = self._imu()
-        if sample is None or missing < 0.01:
-            return None
-        if repeated < 0.01 and self._last is not None:
-            return self._last
-        time, gyro, force = sample
-        self._last = time + JITTER * (2.0 * late - 1.0), gyro, force
-        return self._last
+    return stage
 
 
-def flown(name, autopilot_imu, jittered=False):
+def flown(name, autopilot_imu):
     scenario = load_scenario(name)
     flight = DirectFlight(
         scenario, load_profile("s500"), Vehicle.load(), 0.2, 1, autopilot_imu=autopilot_imu
     )
-    if jittered:
-        flight.autopilot.imu = Jittered(flight.autopilot.imu)
+    if autopilot_imu:
+        flight.control.insert("estimator", "jitter", jittered())
     flight.run()
     return flight, metrics.errors(flight.recording.series())
 
@@ -51,7 +53,7 @@ def flown(name, autopilot_imu, jittered=False):
 )
 def test_the_mission_is_completed_with_jitter_as_with_the_companions_imu(name):
     _, nominal = flown(name, autopilot_imu=False)
-    flight, errors = flown(name, autopilot_imu=True, jittered=True)
+    flight, errors = flown(name, autopilot_imu=True)
     assert flight.mission.output.done and not flight.mission.output.abort_reason
     ticks = flight.control.estimator.ticks
     assert min(ticks.missing, ticks.repeated) > 25  # of some 60 each in the short mission

@@ -27,19 +27,18 @@ def flight(scenario="quick_pick", payload=0.2, seed=1, **changes):
 
 def make_late(a_flight, delay):
     """Deliver the payload's poses `delay` [s] later, with their stamps."""
-    deliver, waiting = a_flight.delivered, deque()
+    control, waiting = a_flight.control, deque()
 
-    def late(samples):
-        *others, payload = deliver(samples)
-        now = a_flight.plant.time
-        if payload is not None:
-            waiting.append((now + delay, payload))
-        due = None
+    def late(control):
+        signals, now = control.signals, a_flight.plant.time
+        if signals.payload is not None:
+            waiting.append((now + delay, signals.payload))
+        signals.payload = None
         while waiting and waiting[0][0] <= now:
-            _, due = waiting.popleft()
-        return *others, due
+            _, signals.payload = waiting.popleft()
+        return True
 
-    a_flight.delivered = late
+    control.insert(control.stages[0].name, "late payload", late)
 
 
 def grasps(a_flight):

@@ -5,18 +5,28 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from uam_control.setpoints.kinds.desired import Desired, level
+from uam_control.stages.step import Stage
 from uam_sim_bridge.faults import imu_faults
 from uam_sim_bridge.faults.fault import Occurrence
 from uam_sim_bridge.plant import Samples
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/extending.md").read_text()
 PARTS = TEXT.partition("## Parts of your own")[2]
-FAULT, SETPOINT = re.findall(r"^```python\n(.*?)^```$", PARTS, re.M | re.S)
+STAGE, FAULT, SETPOINT = re.findall(r"^```python\n(.*?)^```$", PARTS, re.M | re.S)
+
+
+def test_the_stage_limits_the_torque():
+    names = {"np": np, "ControlTick": object, "Stage": Stage}
+    exec(STAGE, names)  # noqa: S102 (our own docs)
+    tick = SimpleNamespace(signals=SimpleNamespace(tau_q=np.array([1.0, -2.0, 0.5])))
+    assert names["entry"].run(tick)
+    assert tick.signals.tau_q.tolist() == [0.8, -0.8, 0.5]
 
 
 def test_the_fault_scales_the_gyroscope():

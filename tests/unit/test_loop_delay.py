@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.setpoints.loop_delay import DELAYS, LoopDelay
-from uam_control.supervision import Readings, SupervisionParameters
+from uam_control.supervision import SupervisionParameters
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger, margin_left
 
 PERIOD, LAG = 0.004, 0.017
@@ -184,18 +184,19 @@ def test_a_gain_that_no_rate_loop_has_gives_no_value(gain):
     assert math.isnan(meter.value)
 
 
+NOMINAL = 0.006
 LIMITS = SupervisionParameters(
-    delay_margin=0.05, delay_nominal=0.006, joint_angle_hold=(1.0,), joint_effort_hold=(1.0,)
+    delay_margin=0.05, delay_nominal=NOMINAL, joint_angle_hold=(1.0,), joint_effort_hold=(1.0,)
 )
 
 
 def test_delay_of_the_setpoints():
-    readings = Readings(round_trip=0.02, loop_delay=0.026)
-    assert by_loop(readings, LIMITS) == pytest.approx(0.02)  # measured, less the nominal
-    assert by_link(readings, LIMITS, True) == pytest.approx(0.01)  # half of the round trip
-    assert by_link(readings, LIMITS, False) == pytest.approx(0.02)  # the whole round trip
-    assert by_loop(Readings(loop_delay=0.001), LIMITS) == 0.0
-    assert math.isnan(by_loop(Readings(), LIMITS)) and math.isnan(by_link(Readings(), LIMITS, True))
+    assert by_loop(0.026, NOMINAL, True) == pytest.approx(0.02)  # measured, less the nominal
+    assert by_link(0.02, 1.0, True) == pytest.approx(0.01)  # half of the round trip
+    assert by_link(0.02, 1.0, False) == pytest.approx(0.02)  # the whole round trip
+    assert by_loop(0.001, NOMINAL, True) == 0.0
+    assert math.isnan(by_loop(0.026, NOMINAL, False))  # it counts in flight
+    assert math.isnan(by_loop(math.nan, NOMINAL, True)) and math.isnan(by_link(math.nan, 1.0, True))
     assert margin_left(0.02, LIMITS) == pytest.approx(0.6)
 
 

@@ -104,7 +104,7 @@ def test_what_the_model_is_made_of():
         ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 is not above 0"),
         (
             (("sensors", "imu", "latency_ticks"), 1.5),
-            "latency_ticks: 0, 1, 2, .. expected, got 1.5",
+            "latency_ticks: a whole number expected, 0, 1, .., got 1.5",
         ),
         ((("magnet", "holding_force"), "strong"), "magnet.holding_force: a number expected"),
         ((("magnet", "curve"), [[0.0, 1.2]]), "magnet.curve: [[0.0, 1.2]]; allowed: [[gap in m,"),

@@ -139,7 +139,7 @@ class CompiledTicks:
         """Make the steps, and the loop over them."""
         flight, control = self._flight, self._flight.control
         names = [stage.name for stage in control.stages]
-        self._mission, self._bridge = 1 + names.index("mission"), 1 + names.index("bridge")
+        self._mission = 1 + names.index("mission")
         stages = [stage.step(control) for stage in control.stages]
         steps = [None if None in stages[: self._mission] else self._sensors(), *stages]
         self._record = len(steps)
@@ -283,9 +283,8 @@ class CompiledTicks:
     def _do(self, place: int) -> int:
         """Do a part in Python."""
         control = self._flight.control
-        if self._bridge < place < self._record:
-            self._take_report()
-            control.signals.setpoint = control.bridge.kept
+        self._take_report()
+        control.signals.setpoint = control.bridge.kept
         goes_on = self._in_python[place]()
         if place == 0:
             self._sample[:] = self._flight.newest[1:]
