@@ -26,11 +26,12 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 
 # Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
 AT_ONCE := -n 4 --dist loadgroup --no-loadscope-reorder
+MARKS := not slow and not long
 test: setup      ## all but the long and the slow tests; options: make test ARGS="tests/unit -x"
 	@$(BIN)/python -m uam_lab.flights.direct.warm_up --all-laws
-	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow and not long" $(AT_ONCE) tests)
+	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "$(MARKS)" $(AT_ONCE) tests)
 
-long: setup      ## further flights, examples among them; CI runs these, too
+long: setup      ## further flights, examples among them; CI runs them together with those of make test
 	@$(BIN)/python -m pytest -m long $(AT_ONCE) tests
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; half an hour
