@@ -350,16 +350,22 @@ def test_the_magnet_of_a_released_vehicle_follows_the_policy():
 
 
 @pytest.mark.parametrize(
-    ("name", "age", "yields"),
-    [("quick_pick", 0.6, True), ("quick_pick", 0.4, False), ("arm_motions", 0.6, False)],
+    ("name", "age", "gap", "yields"),
+    [
+        ("quick_pick", 0.6, 0.0, True),
+        ("quick_pick", 0.4, 0.0, False),
+        ("quick_pick", 0.6, 0.6, False),  # no ticks meanwhile: nothing could be heard
+        ("arm_motions", 0.6, 0.0, False),
+    ],
 )
-def test_the_arm_gives_way_above_a_stand_when_the_bridge_is_silent(name, age, yields):
+def test_the_arm_gives_way_above_a_stand_when_the_bridge_is_silent(name, age, gap, yields):
     flight = Flight(name, grasp_checks="off")
     flight.until(lambda o: o.time > 8.0)
     flight.readings = Readings(
         mocap_age=0.01, joint_age=0.01, controller_age=0.01, autopilot_age=age
     )
     flight.state[0, 7] += 0.05  # the stand presses on it
+    flight.stamp += gap
     output = flight.step(follow=False)
     assert (output.reference[0, 7] == flight.state[0, 7]) == yields
 

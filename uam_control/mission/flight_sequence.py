@@ -85,6 +85,7 @@ class Mission:
         self.memory = record(WHOLE, REAL)
         self._on_ground = prepared(on_ground, self.output.reference, 0.0, 0.0, 0.0)
         self._age = 0.0  # [s] of the newest state: one tick
+        self._resumed = -math.inf  # stamp [s] of the first tick after a gap
         self._seen: Observation | None = None
         checklist = self._start.require_checklist
         self._pre_arm = PreArm(scenario, checklist, vehicle, compared)
@@ -227,6 +228,8 @@ class Mission:
         for the companion.
         """
         output, guidance = self.output, self._guidance
+        if stamp - self._stamp > OLDEST:
+            self._resumed = stamp
         self._age, self._stamp = min(max(stamp - self._stamp, 0.0), OLDEST), stamp
         if guidance is not None:
             output.time = stamp - self._takeoff
@@ -443,7 +446,8 @@ class Mission:
         A stiff arm on the stand levers the vehicle over. A silent bridge sends no setpoints.
         """
         guidance, held = self._guidance, seen.authority
-        lands = held.lands or seen.readings.autopilot_age > SILENT
+        heard = stamp - self._resumed > SILENT  # a gap of the ticks is no silence of the bridge
+        lands = held.lands or (heard and seen.readings.autopilot_age > SILENT)
         lands = lands and not held.landed and guidance is not None
         flying = self.output.state is State.FLYING  # nobody has stopped it
         if not lands:
