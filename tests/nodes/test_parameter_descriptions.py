@@ -10,6 +10,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
 from uam_lab.flights.ros.node_arguments import FUSED, MODULES
 from uam_msgs_py.node import wiring
+from uam_sim_bridge.nodes import bridge_parameters
 
 # declared by rclpy itself
 RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
@@ -87,6 +88,8 @@ def test_every_parameter_is_described_and_ranged(start, probe, tmp_path, node):
             assert about.additional_constraints.startswith(shown), name
             assert about.description.endswith("]"), f"{name}: without a unit"
     assert WHOLE.get(node, set()) <= set(found)
+    if node == wiring.BRIDGE:  # the direct engine refuses a name that is not among them
+        assert set(found) == bridge_parameters.NAMES - {"use_sim_time"}
     assert running.interrupt() == 0, running.output
 
 

@@ -47,7 +47,7 @@ def follow_scenario(
     late = path.times[path.numbers[0].following] >= m.half
     if not calm or (late and on_ground(state, m.ground, m.height, m.speed)):
         return False
-    if readings.values[AUTOPILOT_AGE] > SILENT:  # see `Mission.step`: the arm may give way
+    if readings.values[AUTOPILOT_AGE] > SILENT:  # the arm may give way, see `Mission`
         return False
     if m.takes_off:
         planned = path.reference[CHI, Z] - m.ground

@@ -111,12 +111,12 @@ KINDS: tuple[type[ParameterSet], ...] = (
     *(RateThrustParameters, SetpointParameters, ThrustIdentificationParameters),
     *(AutopilotMagnetParameters, SwitchingParameters, ProcessParameters, TickTimesParameters),
 )
-OTHERS = ("vehicle", "publishers", "use_sim_time")  # of every node
+EVERY_NODE = ("vehicle", "publishers", "use_sim_time")
+NAMES = {*EVERY_NODE, *(name for kind in KINDS for name in kind.specs())}
 
 
 def check_names(profile: Profile) -> None:
     """Raise ProfileError for a name in a profile's section of the bridge that is no parameter."""
-    known = {name for kind in KINDS for name in kind.specs()}
     for name in profile.section(BRIDGE):
-        if name not in known and name not in OTHERS:
-            raise ProfileError(f"{profile.file}: {BRIDGE}: {name}: {unknown(name, sorted(known))}")
+        if name not in NAMES:
+            raise ProfileError(f"{profile.file}: {BRIDGE}: {name}: {unknown(name, sorted(NAMES))}")
