@@ -74,7 +74,8 @@ def add(commands: Subcommands) -> None:
     command.vehicle("the lab file's")
     command.profile()
     command.plant()
-    command.choice("--engine", (*ENGINES, REHEARSAL), "direct", "")
+    about = f"{REHEARSAL}: the vehicle's nodes on emulated devices, for faults of cables"
+    command.choice("--engine", (*ENGINES, REHEARSAL), "direct", about)
     command.config(TEMPLATE)
     command.choice("--clock", CLOCKS, "lockstep", "of the ROS engine")
     command.seed("of all noise")
