@@ -26,7 +26,7 @@ def test_the_examples_can_be_typed():
     lines = re.findall(r"^\.venv/bin/uam (.*?)(?: {2,}#.*)?$", TEXT, re.M)
     options = [vars(parser().parse_args(shlex.split(line))).get("faults") or [] for line in lines]
     texts = [text for found in options for text in found if not text.endswith(".yaml")]
-    assert len(lines) == 12 and len(texts) == 3
+    assert len(lines) == 11 and len(texts) == 3
     read_schedule(texts, load_scenario("pick_and_place"), 1)
 
 

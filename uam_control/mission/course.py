@@ -1,7 +1,6 @@
 """Courses of the reference, the cues that change them, and the transitions, as data.
 
-There are no other transitions than those of `COURSES`. docs/supervision.md shows them as a diagram;
-a test compares the two. The arm has its own motion beside the course.
+There are no other transitions than those of `COURSES`. The arm has its own motion beside them.
 """
 
 from __future__ import annotations

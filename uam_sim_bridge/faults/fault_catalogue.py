@@ -40,9 +40,9 @@ def make(name: object, values: dict[str, object]) -> Fault:
 
 def table() -> str:
     """Return the catalogue as a Markdown table: the table of docs/faults.md."""
-    lines = ["| fault | does | acts on | parameters (range: default) |", "|---|---|---|---|"]
+    lines = ["| fault | does | acts on | parameters |", "|---|---|---|---|"]
     for name, kind in FAULTS.items():
-        words = "; ".join(parameters(kind)) or "–"
+        words = ", ".join(f"`{parameter}`" for parameter in kind.specs()) or "–"
         lines.append(f"| `{name}` | {kind.ABOUT} | {kind.PLACE} | {words} |")
     return "\n".join(lines) + "\n"
 
