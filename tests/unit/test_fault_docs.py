@@ -14,10 +14,6 @@ from uam_sim_bridge.faults import FAULTS, fault_catalogue, read_schedule
 TEXT = (Path(__file__).resolve().parents[2] / "docs/faults.md").read_text()
 
 
-def test_the_catalogue_is_that_of_the_code():
-    assert fault_catalogue.table() in TEXT
-
-
 def test_the_outcomes_are_those_of_the_code():
     assert "".join(f"| {name} | {about} |\n" for name, about in OUTCOMES.items()) in TEXT
 

@@ -1,4 +1,4 @@
-"""All faults by name, their creation from parameters, and their tables for docs and terminal."""
+"""All faults by name, their creation from parameters, and their list for the terminal."""
 
 from __future__ import annotations
 
@@ -36,15 +36,6 @@ def make(name: object, values: dict[str, object]) -> Fault:
         return FAULTS[name].from_mapping(values)
     except ParameterError as error:
         raise FaultError(f"{name}: {error}") from None
-
-
-def table() -> str:
-    """Return the catalogue as a Markdown table: the table of docs/faults.md."""
-    lines = ["| fault | does | acts on | parameters |", "|---|---|---|---|"]
-    for name, kind in FAULTS.items():
-        words = ", ".join(f"`{parameter}`" for parameter in kind.specs()) or "–"
-        lines.append(f"| `{name}` | {kind.ABOUT} | {kind.PLACE} | {words} |")
-    return "\n".join(lines) + "\n"
 
 
 def listing() -> str:
