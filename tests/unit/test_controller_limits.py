@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from uam_control.control.output_limits import (
+    ForceCompletion,
     PositionLimits,
     complete_effort,
     complete_force,
@@ -103,13 +104,17 @@ def test_the_known_load_takes_the_place_of_the_feedforward(loaded, expected):
     np.testing.assert_allclose(tau, expected)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5])
 @pytest.mark.parametrize(("gravity", "heavier"), [(0.5, 1.5), (0.0, 1.0)])
 def test_an_integral_of_a_quarter_holds_up_half_of_a_weight_at_half_a_unit_of_gravity(
-    gravity, heavier
+    gravity, heavier, share
 ):
-    """inertia 2, integral -0.25; drag of 0.5 at 2 m/s."""
-    tau, integral = np.array([1.0, 0.0, 3.0]), np.array([0.0, 0.0, -0.25])
+    """inertia 2, integral -0.25, or half of it in the law's bias; drag of 0.5 at 2 m/s."""
+    integral = np.array([0.0, 0.0, share * -0.25])
+    bias = np.array([0.0, 0.0, -0.25]) - integral
+    tau = np.array([1.0, 0.0, 3.0]) - 2.0 * bias  # as the law writes it
     none, inertia = np.zeros(3), np.full(3, 2.0)
     velocity, drag = np.array([2.0, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
-    complete_force(velocity, none, drag, inertia, none, 9.0, gravity, False, 0.1, integral, tau)
+    completion = ForceCompletion(drag, inertia, none, 9.0, gravity, 0.0, 0.0, 9.0, 1.0)
+    complete_force(completion, velocity, none, False, 0.1, bias, integral, tau)
     np.testing.assert_allclose(tau, [2.0 * heavier, 0.0, 3.0 * heavier + 0.5])

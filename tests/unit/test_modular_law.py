@@ -178,11 +178,11 @@ def test_low_pass_on_the_acceleration_by_hand():
     half = math.log(2.0)
     update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0), dt=half)
     # rho = .5 + .25*2 + .125*4 + .0625*4 + .1 = 1.85 with half of 8; K3 saw 4 as well
-    np.testing.assert_allclose(a_law.adaptation[5:], [1.85, 0.75, 4.0])
+    np.testing.assert_allclose(a_law.adaptation[5:], [1.85, 0.75, 0.0, 4.0])
     keep = math.exp(-8.0 * half)
     assert a_law.adaptation[3] == pytest.approx(0.0625 * keep + (1.0 - keep) * 0.75 * 4.0 / 8.0)
     update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0), dt=half)
-    assert a_law.adaptation[7] == pytest.approx(6.0)  # half of what was missing
+    assert a_law.adaptation[-1] == pytest.approx(6.0)  # half of what was missing
 
 
 def test_three_axes_share_one_norm_of_r_by_hand():
@@ -194,7 +194,7 @@ def test_three_axes_share_one_norm_of_r_by_hand():
     # r = (1, 2, 2), ||r|| = 3; rho = .5 + .1 = .6: dtau = .2 r; feedback = (4, 6, 8)
     # tau = (-4 - .2, 2 (1 - 6 - .4), 4 (-8 - .4))
     np.testing.assert_allclose(tau, [-4.2, -10.8, -33.6])
-    np.testing.assert_allclose(a_law.adaptation[5:], [0.6, 3.0, 0.0])
+    np.testing.assert_allclose(a_law.adaptation[5:], [0.6, 3.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_zeta_rests_at_the_edge_of_the_boundary_layer():
@@ -254,7 +254,7 @@ def test_freeze_keeps_the_gains_and_reset_restores_them():
     np.testing.assert_array_equal(a_law.adaptation[:5], [0.5, 0.25, 0.125, 0.0625, 0.1])
     assert a_law.adaptation[6] == 5.0  # ||r|| of the last tick is no adapted gain
     a_law.reset()
-    np.testing.assert_array_equal(a_law.adaptation, [0.5, 0.25, 0.125, 0.0625, 0.1, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(a_law.adaptation, [0.5, 0.25, 0.125, 0.0625, 0.1, 0, 0, 0, 0])
 
 
 SINGULAR = {"lambda_1": [0.25], "lambda_2": [1e6], "q_position": [1e6]}
@@ -300,3 +300,61 @@ def test_safeguards_that_are_on_are_named():
 def test_bad_parameters_are_refused_with_the_reason(change, reason):
     with pytest.raises(ParameterError, match=reason):
         ModularParameters.from_mapping(ONE_AXIS | change, 1)
+
+
+BIAS = 7  # of the gains: where theta_hat begins
+
+
+def test_bias_by_hand():
+    """r = e + e_dot = 0.3; theta_hat' = 10 r; dtau has theta_hat, tau = -2 (...)."""
+    a_law, printed = law(bias_gain=[10.0]), law()
+    assert update(a_law, 0.2, 0.1) == update(printed, 0.2, 0.1)
+    assert a_law.adaptation[BIAS] == pytest.approx(0.012)
+    assert update(a_law, 0.2, 0.1) == pytest.approx(update(printed, 0.2, 0.1) - 2.0 * 0.012)
+
+
+def test_bias_leaks():
+    """theta_hat' = 10 * 0.3 - 2 theta_hat from 0: 1.5 (1 - exp(-2 t))."""
+    a_law = law(bias_gain=[10.0], bias_leakage=2.0)
+    for _ in range(250):
+        update(a_law, 0.2, 0.1)
+    assert a_law.adaptation[BIAS] == pytest.approx(1.5 * (1.0 - math.exp(-2.0)))
+
+
+def test_bias_does_not_grow_while_saturated_and_may_shrink():
+    a_law = law(bias_gain=[10.0])
+    update(a_law, 0.2, 0.1)
+    update(a_law, 0.2, 0.1, saturated=True)
+    assert a_law.adaptation[BIAS] == pytest.approx(0.012)
+    update(a_law, -0.05, -0.05, saturated=True)
+    assert a_law.adaptation[BIAS] == pytest.approx(0.008)
+
+
+def test_frozen_adaptation_keeps_the_bias():
+    a_law = law(bias_gain=[10.0], adapt=False)
+    update(a_law, 0.2, 0.1)
+    assert a_law.adaptation[BIAS] == 0.0
+
+
+@given(
+    st.lists(st.floats(-30.0, 30.0), min_size=6, max_size=6),
+    st.lists(st.floats(0.0, 100.0), min_size=3, max_size=3),
+    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
+)
+def test_bias_stays_in_its_ball_and_does_not_raise_the_lyapunov_function(errors, gamma, true):
+    """V = 1/2 theta~' Gamma^-1 theta~ changes by at most theta~' r dt, plus what the step adds."""
+    three = {name: ONE_AXIS[name] * 3 for name in ("inertia", *AXIS_VECTORS)}
+    values = ONE_AXIS | three | {"bias_gain": [g + 0.1 for g in gamma], "bias_limit": 2.0}
+    a_law = ModularLaw(ModularParameters.from_mapping(values, 3))
+    e, e_dot = np.array(errors[:3]), np.array(errors[3:])
+    r, gain, dt = e + e_dot, np.array(values["bias_gain"]), 1e-6
+    true, zero = np.array(true), np.zeros(3)
+    a_law.adaptation[BIAS:-1] = np.array([1.2, -1.6, 0.0])  # on the ball
+    before = a_law.adaptation[BIAS:-1] - true
+    a_law.update(e, e_dot, zero, zero, False, dt)
+    after = a_law.adaptation[BIAS:-1] - true
+    assert np.linalg.norm(a_law.adaptation[BIAS:-1]) <= 2.0 * (1.0 + 1e-12)
+    change = 0.5 * np.sum((after**2 - before**2) / gain)
+    # the ball's centre is 0: radial scaling moves by the square of a step
+    rest = 10.0 * np.sum((gain * np.abs(r) * dt) ** 2) / gain.min() + 1e-15
+    assert change <= np.sum(before * r) * dt + rest

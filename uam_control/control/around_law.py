@@ -45,12 +45,12 @@ class ControllerArrays(NamedTuple):
 
 
 class PositionArrays(NamedTuple):
-    """Of the `PositionController`. integral (3,) [m/s^2] of integral_gain e; filter, lead,
-    attitude: see `attitude_reference_step`."""
+    """Of the `PositionController`. carried [m/s^2]: bias (3,) of the law, integral (3,) of
+    integral_gain e; filter, lead, attitude: see `attitude_reference_step`."""
 
     all: ControllerArrays
     completion: ForceCompletion
-    integral: np.ndarray
+    carried: tuple[np.ndarray, np.ndarray]
     cutoff: float
     filter: np.ndarray
     lead: np.ndarray
@@ -148,7 +148,7 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     m, tau = a.all.numbers[0], a.all.tau
     saturated, e, found = m.saturated != 0, a.all.own[E], a.all.law.tau
     m.saturated = complete_and_limit(
-        reference, e, a.completion, saturated, dt, a.integral, found, tau
+        reference, e, a.completion, saturated, dt, a.carried, found, tau
     )
     attitude_reference_step(tau, reference, a.cutoff, dt, a.filter, a.lead, a.attitude)
 

@@ -96,8 +96,13 @@ class Controller:
         raise NotImplementedError
 
     def reset_adaptation(self) -> None:
-        """Set the adapted gains to their initial values in flight; nothing else changes."""
+        """Set the adapted gains to their initial values in flight, bias and integral to zero."""
         self.law.reset_adaptation()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Set what the vehicle carries to zero: the law's bias."""
+        self.law.bias[:] = 0.0
 
     @property
     def errors(self) -> np.ndarray:
@@ -113,10 +118,17 @@ class Controller:
     def _run_law(self, dt: float) -> None:
         self.law.update(*self._own, self._norms, self.saturated, dt)
 
-    def _begins(self) -> bool:
-        """Return whether this is the first tick of the law since `_idle`."""
+    def _handed_back(self, reference: np.ndarray) -> bool:
+        """Return whether this first tick of the law since `_idle` is one in flight.
+
+        What the vehicle carries, the weight of a payload or the wind, is then still there. On the
+        ground it is forgotten.
+        """
         begins, self.flying = not self.flying, True
-        return begins
+        in_flight = begins and _in_flight(reference)
+        if begins and not in_flight:
+            self._forget()
+        return in_flight
 
     def _idle(self) -> np.ndarray:
         """Reset the law; return its output, zero."""
@@ -152,7 +164,8 @@ class PositionController(Controller):
             float(p.tilt_max),
         )
         filtered = float(cutoff), desired.filter, desired.lead, desired.value
-        arrays = PositionArrays(of_all, completion, self._integral, *filtered)
+        carried = self.law.bias, self._integral
+        arrays = PositionArrays(of_all, completion, carried, *filtered)
         rows = self._errors
         self._begin = bound(begin_law, of_all, rows, rows, desired.value, True)
         self._end = bound(end_position, arrays, rows, 0.0)
@@ -163,9 +176,8 @@ class PositionController(Controller):
         """Rows q_d [rad], Omega_d, Omega_d_dot (3, 3); see `AttitudeReference.value`."""
         return self._attitude.value
 
-    def reset_adaptation(self) -> None:
-        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
-        super().reset_adaptation()
+    def _forget(self) -> None:
+        super()._forget()
         self._integral[:] = 0.0
 
     def update(
@@ -175,17 +187,12 @@ class PositionController(Controller):
 
         state, reference: (3, 6 + n), see `coordinates`; dt [s]. ||xi|| uses the desired attitude of
         the last tick, because that of this tick follows from tau_p. The next call reuses the array.
-        The integral of a vehicle that is handed back in flight is that of its last tick: the weight
-        of a payload and the wind are still there.
         """
         if not flying:
             self._attitude.reset(state[CHI, YAW])
             return self._idle()
-        if self._begins():
-            if _in_flight(reference):
-                self._attitude.begin(state, reference)
-            else:
-                self._integral[:] = 0.0
+        if self._handed_back(reference):
+            self._attitude.begin(state, reference)
         self._fit(state)
         self._begin(state, reference, self._attitude.value, True)
         self._run_law(dt)
@@ -246,7 +253,7 @@ class AttitudeController(Controller):
         if not flying:
             self._slow[:] = 0.0
             return self._idle()
-        if self._begins() and _in_flight(reference):
+        if self._handed_back(reference):
             self._slow[:] = math.nan
         self._fit(state)
         self._begin(state, reference, attitude_reference, dt)
@@ -290,9 +297,8 @@ class ArmController(Controller):
         self._end = bound(end_arm, arrays, rows, rows, 0.0)
         return arrays
 
-    def reset_adaptation(self) -> None:
-        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
-        super().reset_adaptation()
+    def _forget(self) -> None:
+        super()._forget()
         self._integral[:] = 0.0
 
     def update(

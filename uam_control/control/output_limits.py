@@ -235,34 +235,12 @@ def integrate(
             integral[i] = min(limit, max(-limit, following))
 
 
-@jit
-def complete_force(
-    velocity_d: np.ndarray,
-    e: np.ndarray,
-    drag: np.ndarray,
-    inertia: np.ndarray,
-    gain: np.ndarray,
-    limit: float,
-    gravity: float,
-    saturated: bool,
-    dt: float,
-    integral: np.ndarray,
-    tau: np.ndarray,
-) -> None:
-    """Add drag and integral action to the law's force tau (3,) [N, ENU], in place.
-
-    velocity_d (3,) [m/s]; drag (3,) [N s/m]; inertia (3,) [kg]; gravity [m/s^2]: what the integral
-    holds up is weight, so the force is for that mass, too; 0 for none of it. e, gain, limit,
-    saturated, dt, integral: see `integrate`.
-    """
-    integrate(e, gain, limit, saturated, dt, integral)
-    heavier = 1.0 - integral[Z] / gravity if gravity > 0.0 else 1.0
-    for i in range(len(tau)):
-        tau[i] = (tau[i] + drag[i] * velocity_d[i]) * heavier - inertia[i] * integral[i]
-
-
 class ForceCompletion(NamedTuple):
-    """What `complete_force` and `limit_force` need besides the tick's values; see there."""
+    """What `complete_force` and `limit_force` need besides the tick's values; see there.
+
+    drag (3,) [N s/m]; inertia (3,) [kg]; integral_gain, integral_limit: see `integrate`.
+    integral_gravity [m/s^2]: gravity, 0: what is carried does not count as weight.
+    """
 
     drag: np.ndarray
     inertia: np.ndarray
@@ -276,34 +254,48 @@ class ForceCompletion(NamedTuple):
 
 
 @jit
+def complete_force(
+    c: ForceCompletion,
+    velocity_d: np.ndarray,
+    e: np.ndarray,
+    saturated: bool,
+    dt: float,
+    bias: np.ndarray,
+    integral: np.ndarray,
+    tau: np.ndarray,
+) -> None:
+    """Add drag and integral action to the law's force tau (3,) [N, ENU], in place.
+
+    velocity_d (3,) [m/s]; bias (3,) [m/s^2]: of the law, part of tau; e, saturated, dt, integral:
+    see `integrate`. What bias and integral hold up is weight, so the rest of the force is for that
+    mass, too.
+    """
+    integrate(e, c.integral_gain, c.integral_limit, saturated, dt, integral)
+    carried = integral[Z] + bias[Z]
+    heavier = 1.0 - carried / c.integral_gravity if c.integral_gravity > 0.0 else 1.0
+    for i in range(len(tau)):
+        own = tau[i] + c.inertia[i] * bias[i] + c.drag[i] * velocity_d[i]
+        tau[i] = own * heavier - c.inertia[i] * (integral[i] + bias[i])
+
+
+@jit
 def complete_and_limit(
     reference: np.ndarray,
     e: np.ndarray,
     c: ForceCompletion,
     saturated: bool,
     dt: float,
-    integral: np.ndarray,
+    carried: tuple[np.ndarray, np.ndarray],
     tau: np.ndarray,
     limited: np.ndarray,
 ) -> bool:
     """Complete the law's force tau (3,), write it within its limits to limited (3,), both [N, ENU].
 
-    reference (3, 6 + n): see `coordinates`; the others: see `complete_force`. Returns whether a
-    limit acted.
+    reference (3, 6 + n): see `coordinates`; carried: bias and integral; the others: see
+    `complete_force`. Returns whether a limit acted.
     """
-    complete_force(
-        reference[CHI_DOT, X:ROLL],
-        e,
-        c.drag,
-        c.inertia,
-        c.integral_gain,
-        c.integral_limit,
-        c.integral_gravity,
-        saturated,
-        dt,
-        integral,
-        tau,
-    )
+    velocity_d = reference[CHI_DOT, X:ROLL]
+    complete_force(c, velocity_d, e, saturated, dt, carried[0], carried[1], tau)
     return limit_force(tau, c.weight, c.thrust_min, c.thrust_max, c.tilt_max, limited)
 
 

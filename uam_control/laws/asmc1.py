@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -46,6 +46,10 @@ class Asmc1Parameters(LawParameters):
     freeze_when_saturated: bool = switch(
         False, "safeguard: |Dhat| does not grow while the actuator saturates"
     )
+
+    def linear(self) -> Self:
+        """See `LawParameters.linear`; Dhat is the integral of s: linear."""
+        return self
 
     def derived(self) -> dict[str, Any]:
         inertia = np.array(self.inertia)

@@ -74,7 +74,7 @@ class Law:
     def __init__(self, parameters: LawParameters) -> None:
         axes = len(parameters.inertia)
         self.names = self.gain_names(axes)
-        self._tau = np.zeros(axes)
+        self._tau, self._no_bias = np.zeros(axes), np.zeros(axes)
         self.adaptation = np.zeros(len(self.names) + self.memory)
         self.set_parameters(parameters)
         self.reset()
@@ -98,9 +98,19 @@ class Law:
         inputs = LawInputs(own, own, own, np.zeros(3), False, False, 0.0)
         self._step = prepared(type(self).step, self.arrays.record, inputs, self.adaptation, own)
 
+    @property
+    def bias(self) -> np.ndarray:
+        """Adapted constant part of dtau (n,) [m/s^2 or rad/s^2], writable; zero without one.
+
+        It is what the vehicle carries, so it outlasts `reset` and `reset_adaptation`.
+        """
+        return self._no_bias
+
     def reset(self) -> None:
         """Set the adapted gains to their initial values, and filters and time to zero."""
+        carried = self.bias.copy()
         self.adaptation[:] = 0.0
+        self.bias[:] = carried
         self.reset_adaptation()
 
     def reset_adaptation(self) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,6 +24,10 @@ class LawParameters(ParameterSet):
     error_rate_form: str = choice(
         "lee", "lee: Omega - R^T R_d Omega_d; printed: q_dot - R_d^T R q_d_dot", ERROR_RATE_FORMS
     )
+
+    def linear(self) -> Self:
+        """Return these parameters for a linear model, in which the gains are given and stay."""
+        return replace(self, adapt=False)
 
     @property
     def safeguards(self) -> list[str]:

@@ -15,13 +15,16 @@ Printed equation numbers and labels of the paper, for position, attitude and arm
 
 xi and chi_ddot are those of the whole vehicle; r_j is the subsystem's own. The norms carry the
 couplings between the subsystems, so the three parameter sets stay independent.
+
+`bias_gain` mends the law (docs/law.md): dtau_j gains theta_hat_j, one vector per subsystem, see
+`adapt_bias`. 0 is the printed law.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -39,7 +42,8 @@ from uam_control.settings.parameter_set import (
     vector,
 )
 
-ZETA, RHO, R_NORM, ACCELERATION = 4, 5, 6, 7
+ZETA, RHO, R_NORM, BIAS = 4, 5, 6, 7
+ACCELERATION = -1
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,18 @@ class ModularParameters(LawParameters):
     acceleration_cutoff: float = number(
         0.0, "safeguard: low-pass on ||chi_ddot||, 0 = off", "Hz", 0.0, 125.0
     )
+
+    bias_gain: tuple = vector(
+        (0.0,), "Gamma of the bias theta_hat, its diagonal; 0 = the printed law", "1/s^2", 0.0, HUGE
+    )
+    bias_leakage: float = number(0.0, "leakage of theta_hat, 0 = none", "1/s", 0.0, 1e3)
+    bias_limit: float = number(3.0, "largest ||theta_hat||", "m/s^2 or rad/s^2", TINY, HUGE)
+
+    adapt_gains: bool = switch(True, "false: K0..K3 and zeta stay, theta_hat alone adapts")
+
+    def linear(self) -> Self:
+        """See `LawParameters.linear`; theta_hat is the integral of r: linear."""
+        return replace(self, adapt_gains=False)
 
     def check_together(self) -> None:
         """Raise ParameterError also where the computed matrix P is not positive definite."""
@@ -121,7 +137,7 @@ class ModularParameters(LawParameters):
 def law_step(
     record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
-    """Compute one tick of the law: write tau (n,) and advance adaptation (8,) in place.
+    """Compute one tick of the law: write tau (n,) and advance adaptation (8 + n,) in place.
 
     inputs: see `LawInputs`; record: of `LawParameters.record`.
     Equations (7), (8), (12), (13) for the position; (17), (18), (21), (22) for the attitude;
@@ -159,13 +175,50 @@ def law_step(
     for i in range(n):
         r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
         feedback = p.gain_e[i] * e[i] + p.gain_e_dot[i] * e_dot[i]
-        tau[i] = p.inertia[i] * (acceleration_d[i] - feedback - scale * r_i)
+        delta = scale * r_i + adaptation[BIAS + i]
+        tau[i] = p.inertia[i] * (acceleration_d[i] - feedback - delta)
     adaptation[RHO] = rho
     adaptation[R_NORM] = r_norm
 
     if frozen:
         return
-    adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation)
+    if p.adapt_gains > 0.0:
+        adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation)
+    adapt_bias(p, e, e_dot, saturated, dt, adaptation[BIAS : BIAS + n])
+
+
+@jit
+def adapt_bias(
+    p: np.record, e: np.ndarray, e_dot: np.ndarray, saturated: bool, dt: float, bias: np.ndarray
+) -> None:
+    """Advance theta_hat_j, bias (n,) [m/s^2 or rad/s^2], by dt [s] in place.
+
+    theta_hat_j' = Gamma_j r_j - leakage theta_hat_j, exact for r_j constant over the tick. On the
+    ball ||theta_hat_j|| = bias_limit the part of Gamma_j r_j that points outwards is taken away,
+    along Gamma_j theta_hat_j: with V's term 1/2 theta~' Gamma^-1 theta~ this adds nothing to dV/dt
+    for a theta_j within the ball (docs/stability.md). While the actuator saturates, no entry grows.
+    """
+    squared = outward = weight = 0.0
+    for i in range(len(bias)):
+        r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
+        squared += bias[i] * bias[i]
+        outward += bias[i] * p.bias_gain[i] * r_i
+        weight += p.bias_gain[i] * bias[i] * bias[i]
+    limit = p.bias_limit
+    taken = outward / weight if squared >= limit * limit and outward > 0.0 else 0.0
+    keep = math.exp(-p.bias_leakage * dt)
+    span = dt if p.bias_leakage * dt < 1e-9 else (1.0 - keep) / p.bias_leakage
+    squared = 0.0
+    for i in range(len(bias)):
+        r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
+        following = keep * bias[i] + span * p.bias_gain[i] * (r_i - taken * bias[i])
+        if not (saturated and abs(following) > abs(bias[i])):
+            bias[i] = following
+        squared += bias[i] * bias[i]
+    if squared > limit * limit:
+        scale = limit / math.sqrt(squared)
+        for i in range(len(bias)):
+            bias[i] *= scale
 
 
 @jit
@@ -185,7 +238,7 @@ def adapt(
     its own gain, K' = u - nu K. Therefore K(dt) = K e^(-nu dt) + (1 - e^(-nu dt)) u / nu, which
     stays positive for every dt. The Appendix proves the same in continuous time.
 
-    bound: rho_j without zeta_j; acceleration: ||chi_ddot||; adaptation: (8,), see `ModularLaw`.
+    bound: rho_j without zeta_j; acceleration: ||chi_ddot||; adaptation: see `ModularLaw`.
     """
     # eq. (13a), (22a), (29a): K0..K2; (13b), (22b), (29b): K3
     regressor = 1.0
@@ -207,7 +260,8 @@ def adapt(
 
 
 class ModularLaw(Law):
-    """Modular law. `adaptation` (8,): K0..K3, zeta, rho, ||r||, filtered ||chi_ddot||."""
+    """Modular law; `adaptation` (8 + n,): published gains K0..K3, zeta, rho, ||r||, theta_hat (n,);
+    filtered ||chi_ddot||."""
 
     kind = ModularParameters
     label = "modular"
@@ -222,7 +276,12 @@ class ModularLaw(Law):
             GainGroup("ζ", ("zeta",)),
             GainGroup("ρ", ("rho",)),
             GainGroup("", ("r_norm",)),
+            GainGroup("$\\hat\\theta$", tuple(f"theta{i}" for i in range(1, axes + 1)), "θ", True),
         )
+
+    @property
+    def bias(self) -> np.ndarray:
+        return self.adaptation[BIAS:ACCELERATION]
 
     def reset_adaptation(self) -> None:
         """Set K0..K3 and zeta to their initial values, eq. (13d), zeta1; (22d); (29d)."""

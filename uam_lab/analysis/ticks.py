@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uam_control.laws.modular import ModularLaw
-from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS, Series, gain_columns
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
 
 CLEARANCE = 0.01  # [m] above the start position: the feet have no ground contact
 LIFTED = 0.001  # [m] above the payload's start position: only the magnet carries it
@@ -22,7 +22,7 @@ def in_the_air(series: Series) -> np.ndarray:
 
     Rows on the ground are left out: the paper's model has no ground contact.
     """
-    names = ModularLaw.gain_names(AXES)
+    names = ModularLaw.gain_names(0)  # those that every subsystem has
     gains = [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
     return airborne(series, gains)
 

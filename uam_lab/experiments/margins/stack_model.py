@@ -19,7 +19,6 @@ import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
-from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import CONTROLLERS, Profile
 from uam_control.stages.control_tick import control_arm, control_attitude, control_position
@@ -57,11 +56,8 @@ def stack_model(
     late_setpoints [ticks]: more delay of the setpoints on their way to the autopilot;
     dry: see `plant_model`.
     """
-    # Adaptation is slow, and its gains are given. That of ASMC-1 is the integral of s: linear.
-    sets = profile.sets | {
-        node: replace(found := profile.sets[node], adapt=found.law == Asmc1Parameters.law)
-        for node in CONTROLLERS
-    }
+    # adaptation is slow, and its gains are given
+    sets = profile.sets | {node: profile.sets[node].linear() for node in CONTROLLERS}
     described, numbers = vehicle.description, vehicle.numbers
     scenario = load_scenario("hover", described)
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)

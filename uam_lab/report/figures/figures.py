@@ -143,9 +143,9 @@ def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
 
 
 def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:
-    """Return whether the flight has any of these gains, in any subsystem."""
+    """Return whether the flight has any of these gains, in any subsystem: one that is not zero."""
     columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
-    return any(np.isfinite(flight.series[column]).any() for column in columns)
+    return any(np.nan_to_num(flight.series[column]).any() for column in columns)
 
 
 def _adaptation_of(
