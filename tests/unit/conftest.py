@@ -59,11 +59,10 @@ def made_up_flight(seed=1, scale=1.0, info=None):
         row[COLUMNS.block("tau_alpha.")] = 0.3 * np.sin(truth[6:8]) + error[6:8]
         row[COLUMNS.block("setpoint.")] = [*error[3:6], (0.58 + 0.05 * magnet) * flying]
         for subsystem in ("position", "attitude", "arm"):
-            gains = np.abs(1.0 + np.sin(0.1 * time + np.arange(7)))
+            names = ModularLaw.gain_names(3)
+            gains = np.abs(1.0 + np.sin(0.1 * time + np.arange(len(names))))
             row[COLUMNS.block(f"adaptation.{subsystem}.")] = np.nan
-            row[gain_columns(subsystem, ModularLaw.gain_names(3), COLUMNS)] = (
-                gains if flying else 0.0
-            )
+            row[gain_columns(subsystem, names, COLUMNS)] = gains if flying else 0.0
         for i in range(1, 5):
             row[COLUMNS[f"rotor_{i}.command"]] = 0.6 * flying
             row[COLUMNS[f"rotor_{i}.thrust"]] = 5.4 * flying

@@ -136,7 +136,7 @@ def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
     assert alone.axes[0].lines[0].get_ydata().max() == -0.1  # signed, hence linear
     assert [axis.get_yscale() for axis in alone.axes[::3]] == ["linear", "log"]
     both = figures.adaptation([DrawnFlight("modular", flight), other])
-    assert [axis.get_ylabel() for axis in both.axes[::3]][3:] == rows
+    assert [axis.get_ylabel() for axis in both.axes[::3]][4:] == rows
 
 
 def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):

@@ -276,7 +276,12 @@ class ModularLaw(Law):
             GainGroup("ζ", ("zeta",)),
             GainGroup("ρ", ("rho",)),
             GainGroup("", ("r_norm",)),
-            GainGroup("$\\hat\\theta$", tuple(f"theta{i}" for i in range(1, axes + 1)), "θ", True),
+            GainGroup(
+                "$\\hat\\theta$",
+                tuple(f"bias{i}" for i in range(1, axes + 1)),
+                "\\hat\\theta",
+                True,
+            ),
         )
 
     @property
