@@ -2,7 +2,7 @@
 
 An age is the stamp of the newest tick, in the autopilot that of its newest cycle, less the stamp of
 the sample. Whoever judges a sample by its age takes the number from here: as it is, or as default
-of a parameter. docs/supervision.md prints the table.
+of a parameter.
 """
 
 from __future__ import annotations

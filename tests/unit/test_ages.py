@@ -1,9 +1,6 @@
-"""The table of ages: its order, that every consumer has its number, and that the page prints it."""
+"""The table of ages: its order, and that every consumer has its number."""
 
 from __future__ import annotations
-
-import re
-from pathlib import Path
 
 from uam_control import ages
 from uam_control.estimation import pose_filter
@@ -43,15 +40,6 @@ def test_every_consumer_has_the_number_of_the_table():
     assert pose_filter.HISTORY * PERIOD > ages.BRIDGED + 2 * PERIOD
     assert autopilot_estimator.HISTORY * PERIOD > ages.FORWARDED + PERIOD
     assert ages.FORWARDED > 2.0 * LONGEST_PERIOD
-
-
-def test_the_page_has_the_table():
-    page = (Path(__file__).parents[2] / "docs/supervision.md").read_text()
-    rows = re.findall(r"^\| `([A-Z_]+)` \| ([\d.]+) \|", page, re.MULTILINE)
-    assert {name: float(value) for name, value in rows} == {
-        name: value for name, value in vars(ages).items() if name.isupper()
-    }
-    assert [float(value) for _, value in rows] == sorted(float(value) for _, value in rows)
 
 
 def test_usable_up_to_an_age_and_a_little_ahead():
