@@ -100,6 +100,19 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     return matrix
 
 
+def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion q (4,) = [w x y z], w >= 0, of R (3, 3)."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    symmetric = [
+        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+        [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+        [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+    ]
+    q = np.linalg.eigh(symmetric)[1][:, -1]  # Bar-Itzhack 2000: of its largest eigenvalue
+    return -q if q[0] < 0.0 else q
+
+
 @jit
 def euler_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Return roll, pitch, yaw (3,) [rad] of the unit quaternion q (4,); |pitch| <= pi/2."""

@@ -105,7 +105,8 @@ class VehicleDescription:
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
     the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
-    PX4's names. arm: None if the file has no such section. numbers: the whole file, including the
+    PX4's names. arm: None if the file has no such section; end_effector: site of the MJCF, "" if
+    the file names none, see `chain_reader`. numbers: the whole file, including the
     values that only the plant reads.
     """
 
@@ -120,6 +121,7 @@ class VehicleDescription:
     servo: Servo
     joints: tuple[Joint, ...]
     arm: Arm | None
+    end_effector: str
     profiles: dict[str, str]
     autopilot: str
     autopilot_gains: dict[str, float]

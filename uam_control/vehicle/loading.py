@@ -61,6 +61,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         arm=_arm(top, len(top.entries("joints"))),
+        end_effector=top.text("end_effector", default=""),
         profiles={
             law: configuration.beside(file, "profiles", profiles.text(law))
             for law in profiles.values

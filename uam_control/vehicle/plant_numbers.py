@@ -9,6 +9,7 @@ from uam_control.settings.section import Section
 # entries that only the description and what is made of it read; a change of them has no effect
 NOT_OF_THE_PLANT = (
     *("model", "profiles", "autopilot", "control_period", "mass", "gravity", "joints", "arm"),
+    "end_effector",
     *("rotors.layout", "rotors.radius", "rotors.moment_ratio", "servos.effort_limit"),
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,6 +38,7 @@ COMMANDS = {
     "budget": "budget",
     "vehicle": "vehicle",
     "arm": "arm",
+    "hand": "hand",
     "identify-joint": "identify_joint",
     "doctor": "doctor",
     "calibrate-mocap": "calibrate_mocap",
@@ -83,11 +85,20 @@ def parser(command: str = "") -> argparse.ArgumentParser:
 def parsed(given: Sequence[str]) -> argparse.Namespace:
     """Return the options of the words `given`; raises SystemExit for wrong ones."""
     top = parser(*given[:1])
-    options, unknown = top.parse_known_args(given)
+    options, unknown = top.parse_known_args(_with_lists(given))
     if unknown:
         top.prog = f"{top.prog} {options.command}"
         top.error(f"unrecognized arguments: {' '.join(unknown)}")
     return options
+
+
+def _with_lists(given: Sequence[str]) -> list[str]:
+    """Return the words with --option=-1,2 for --option -1,2, which argparse takes for two."""
+    words: list[str] = []
+    for word in given:
+        negative = re.match(r"-[.\d].*,", word) and words and words[-1].startswith("--")
+        words[-1:] = [f"{words[-1]}={word}"] if negative else [*words[-1:], word]
+    return words
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,0 +1,1 @@
+"""The arm: a serial chain of hinges, its numbers, its compiled kinematics and dynamics."""

@@ -1,0 +1,222 @@
+"""The numbers of a serial arm: `Chain` for compiled functions, `ChainParameters` for ROS.
+
+All frames are parallel to the base's (FLU) while every joint is at zero. So a link needs no
+rotation of its own; an axis, a centre or an inertia has the numbers that CAD shows in that pose.
+
+How others use it:
+
+    chain = chain_of(vehicle)          # vehicle/chain_reader.py: from a vehicle's compiled MJCF
+    chain = parameters.chain()         # from a node's `ChainParameters`
+    # kinematics.py, all in the base frame
+    position, rotation = hand_pose(chain, q, DOWN)
+    hand_jacobian(chain, q, DOWN, jacobian)                    # (6, n): linear, then angular
+    centre = vehicle_centre(chain, q, DOWN)
+    # dynamics.py
+    push, moment = inverse_dynamics(chain, motion, force, rates, turning, torques)
+    push, moment = gravity_torque(chain, q, force, torques)
+    mass_matrix(chain, q, matrix)
+    carrying(chain, mass)              # the same arm with a point mass at its hand
+
+Vectors and rotations are tuples, see `maths/vectors.py`; q (n,) and what is written are arrays.
+`has_hand` is 0 for an arm without an end effector.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from uam_control.settings.parameter_set import (
+    ANY_LENGTH,
+    ParameterError,
+    ParameterSet,
+    number,
+    vector,
+)
+
+JOINTS = 7  # the most
+DIGITS = 12  # of the derived parameters
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of a symmetric matrix: xx yy zz xy xz yz
+
+
+class Chain(NamedTuple):
+    """An arm of n joints; frames parallel to the base's with every joint at zero.
+
+    offsets (n, 3) [m]: of a joint from the one before, the first from the base's origin; axes
+    (n, 3): unit vectors; masses (n,) [kg], centres (n, 3) [m] and inertias (n, 3, 3) [kg m^2] about
+    them, of the links, from their joints; armature [kg m^2], damping [N m s/rad], friction [N m]:
+    (n,). base_mass, base_centre (3,), base_inertia (3, 3) about it: what no joint turns.
+
+    The end effector, if has_hand is 1: hand_place (3,) [m] in the last link, hand_turn (3, 3): its
+    axes at zero. One that hangs on a passive hinge there has swing_axis (3,), zeros otherwise;
+    swing_reach (3,) [m]: from the hinge to it; swing_mass, swing_centre (3,): of what hangs. This
+    mass is counted in the last link, at the hinge: what swings freely carries no moment.
+    """
+
+    offsets: np.ndarray
+    axes: np.ndarray
+    masses: np.ndarray
+    centres: np.ndarray
+    inertias: np.ndarray
+    armature: np.ndarray
+    damping: np.ndarray
+    friction: np.ndarray
+    base_mass: float
+    base_centre: np.ndarray
+    base_inertia: np.ndarray
+    has_hand: int
+    hand_place: np.ndarray
+    hand_turn: np.ndarray
+    swing_axis: np.ndarray
+    swing_reach: np.ndarray
+    swing_mass: float
+    swing_centre: np.ndarray
+
+
+def _many(what: str, unit: str, low: float, high: float) -> Any:
+    return vector((), what, unit, low, high, ANY_LENGTH, True)
+
+
+@dataclass(frozen=True)
+class ChainParameters(ParameterSet):
+    """The arm's numbers, base to tip, in frames parallel to the base's with all joints at zero."""
+
+    joint_offsets: tuple = _many("x y z of each joint, from the one before", "m", -10.0, 10.0)
+    joint_axes: tuple = _many("x y z of each joint's axis", "", -1.0, 1.0)
+    link_masses: tuple = _many("mass of each link, with what hangs on it", "kg", 0.0, 50.0)
+    link_centres: tuple = _many("x y z of each link's mass, from its joint", "m", -10.0, 10.0)
+    link_inertias: tuple = _many(
+        "xx yy zz xy xz yz of each link about its centre of mass", "kg m^2", -50.0, 50.0
+    )
+    joint_armature: tuple = _many("reflected inertia of each joint's motor", "kg m^2", 0.0, 10.0)
+    joint_damping: tuple = _many("viscous friction of each joint", "N m s/rad", 0.0, 10.0)
+    joint_friction: tuple = _many("dry friction of each joint", "N m", 0.0, 10.0)
+    base_mass: float = number(0.0, "mass of the vehicle without the links", "kg", 0.0, 100.0)
+    base_centre: tuple = _many("x y z of that mass in the base frame", "m", -10.0, 10.0)
+    base_inertia: tuple = _many("xx yy zz xy xz yz of that mass", "kg m^2", -50.0, 50.0)
+    hand_place: tuple = _many(
+        "x y z of the end effector, or of the hinge it hangs on, in the last link", "m", -10.0, 10.0
+    )
+    hand_turn: tuple = _many("rotation of its axes, row by row", "", -1.0, 1.0)
+    swing_axis: tuple = _many(
+        "x y z of the hinge that it hangs on; none: it is fixed", "", -1.0, 1.0
+    )
+    swing_reach: tuple = _many("x y z from that hinge to the end effector", "m", -10.0, 10.0)
+    swing_mass: float = number(0.0, "mass that hangs on that hinge", "kg", 0.0, 50.0)
+    swing_centre: tuple = _many(
+        "x y z from that hinge to the centre of this mass", "m", -10.0, 10.0
+    )
+
+    def check_together(self) -> None:
+        """See `ParameterSet.check_together`."""
+        super().check_together()
+        n, per_joint = len(self.link_masses), {
+            "joint_offsets": 3, "joint_axes": 3, "link_centres": 3, "link_inertias": 6,
+            "joint_armature": 1, "joint_damping": 1, "joint_friction": 1,
+        }  # fmt: skip
+        whole = {"base_centre": 3, "base_inertia": 6, "hand_place": 3, "hand_turn": 9}
+        whole |= dict.fromkeys(("swing_axis", "swing_reach", "swing_centre"), 3)
+        if n > JOINTS:
+            raise ParameterError(f"link_masses: {n} links; at most {JOINTS} are possible")
+        for name, each in per_joint.items():
+            if len(getattr(self, name)) != each * n:
+                raise ParameterError(
+                    f"{name}: {len(getattr(self, name))} numbers, {each * n} expected for {n} "
+                    "link_masses"
+                )
+        for name, count in whole.items():
+            if len(getattr(self, name)) not in (0, count):
+                raise ParameterError(f"{name}: a list of {count} numbers expected")
+        lengths = np.linalg.norm(np.reshape(self.joint_axes, (-1, 3)), axis=1)
+        if np.any(np.abs(lengths - 1.0) > 1e-6):
+            raise ParameterError("joint_axes: each x y z must have the length 1")
+
+    def chain(self) -> Chain:
+        """Return the chain; one of no joints without link_masses."""
+        hand, swings = bool(self.hand_place), bool(self.swing_axis)
+        turn = np.reshape(self.hand_turn or np.eye(3), (3, 3))
+        return Chain(
+            *(_points(self.joint_offsets), _points(self.joint_axes), np.array(self.link_masses)),
+            *(_points(self.link_centres), _symmetric(self.link_inertias)),
+            *(np.array(self.joint_armature), np.array(self.joint_damping)),
+            *(np.array(self.joint_friction), float(self.base_mass), _point(self.base_centre)),
+            *(_symmetric(self.base_inertia or (0.0,) * 6)[0], int(hand), _point(self.hand_place)),
+            *(turn, _point(self.swing_axis)),
+            *(_point(self.swing_reach), float(self.swing_mass) * swings),
+            _point(self.swing_centre),
+        )
+
+
+def as_parameters(chain: Chain) -> dict[str, Any]:
+    """Return the values of `ChainParameters` for a chain."""
+    values = {
+        "joint_offsets": chain.offsets,
+        "joint_axes": chain.axes,
+        "link_masses": chain.masses,
+        "link_centres": chain.centres,
+        "link_inertias": _upper(chain.inertias),
+        "joint_armature": chain.armature,
+        "joint_damping": chain.damping,
+        "joint_friction": chain.friction,
+        "base_mass": chain.base_mass,
+        "base_centre": chain.base_centre,
+        "base_inertia": _upper(chain.base_inertia[None]),
+    }
+    if chain.has_hand:
+        values["hand_place"], values["hand_turn"] = chain.hand_place, chain.hand_turn
+    if chain.has_hand and np.any(chain.swing_axis):
+        values["swing_axis"], values["swing_reach"] = chain.swing_axis, chain.swing_reach
+        values["swing_mass"], values["swing_centre"] = chain.swing_mass, chain.swing_centre
+    return {name: _rounded(value) for name, value in values.items()}
+
+
+def carrying(chain: Chain, mass: float) -> Chain:
+    """Return the chain with a point mass [kg] at its hand; at the hinge of a hand that hangs."""
+    last = chain.masses[-1], chain.centres[-1], chain.inertias[-1]
+    masses, centres, inertias = chain.masses.copy(), chain.centres.copy(), chain.inertias.copy()
+    masses[-1], centres[-1], inertias[-1] = with_point(*last, mass, chain.hand_place)
+    return chain._replace(masses=masses, centres=centres, inertias=inertias)
+
+
+def with_point(
+    own: float, centre: np.ndarray, inertia: np.ndarray, mass: float, place: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return mass [kg], centre (3,) [m] and inertia about it (3, 3) of a body with a point mass.
+
+    own [kg], centre, inertia: of the body; mass [kg] at place (3,) [m].
+    """
+    total = own + mass
+    if not mass:
+        return own, centre, inertia
+    apart = place - centre
+    more = own * mass / total * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    return total, centre + apart * mass / total, inertia + more
+
+
+def _rounded(value: np.ndarray | float) -> list[float] | float:
+    found = np.round(np.asarray(value, dtype=float), DIGITS) + 0.0
+    return found.ravel().tolist() if found.ndim else found.item()
+
+
+def _points(values: tuple) -> np.ndarray:
+    return np.array(values, dtype=float).reshape(-1, 3)
+
+
+def _point(values: tuple) -> np.ndarray:
+    return np.array(values or (0.0, 0.0, 0.0), dtype=float)
+
+
+def _symmetric(values: tuple) -> np.ndarray:
+    """Return matrices (n, 3, 3) of xx yy zz xy xz yz each."""
+    upper = np.array(values, dtype=float).reshape(-1, 6)
+    found = np.zeros((len(upper), 3, 3))
+    for k, (i, j) in enumerate(PAIRS):
+        found[:, i, j] = found[:, j, i] = upper[:, k]
+    return found
+
+
+def _upper(matrices: np.ndarray) -> np.ndarray:
+    """Return xx yy zz xy xz yz (n, 6) of matrices (n, 3, 3)."""
+    return np.stack([matrices[:, i, j] for i, j in PAIRS], axis=1)
