@@ -28,7 +28,9 @@ LAW = ModularParameters(
     nu=(1.0, 2.0, 2.0, 2.0),
     epsilon=0.1,
     varpi=0.05,
+    bias_gain=(0.0, 0.0, 0.0),
 )
+MENDED = replace(LAW, bias_gain=(40.0, 20.0, 20.0), bias_limit=1.2)
 
 
 def tracking_of(e, e_dot, acceleration=0.0):
@@ -79,13 +81,14 @@ def test_v_and_bound_worked_by_hand():
     e, e_dot = np.array([[2.0, 0, 0], [0, 0, 0]]), np.array([[1.0, 0, 0], [0, 0, 0]])
     gains = np.array([[1.0, 0, 0, 0], [3.0, 1, 0, 0]])
     zeta, star = np.array([0.2, 0.1]), np.array([2.0, 0, 0, 1.0])
-    parts = lyapunov_bound.parts("position", record, tracking_of(e, e_dot), gains, zeta, star)
+    off = np.zeros((2, 3))
+    parts = lyapunov_bound.parts("position", record, tracking_of(e, e_dot), gains, zeta, star, off)
     np.testing.assert_allclose(parts.tracking, [0.5 * (4 * 1.125 + 2 * 2 * 0.125 + 0.15625), 0.0])
     np.testing.assert_allclose(parts.gains, [1.0, 1.5])
     np.testing.assert_allclose(parts.zeta, [2.0, 1.0])
     matrix = np.array([[1.125, 0.125], [0.125, 0.15625]])
     largest = np.linalg.eigvalsh(matrix)[1]
-    found = lyapunov_bound.comparison(LAW, zeta, star)
+    found = lyapunov_bound.comparison(LAW, zeta, star, np.zeros(3))
     assert found.rate == pytest.approx(1.0 / largest)
     growth = found.rate * 2.0 + 0.1 / 0.1 + 0.5 * (1.0 * 4.0 + 2.0 * 1.0)
     assert found.growth == pytest.approx(growth)
@@ -105,38 +108,55 @@ def test_the_envelope_solves_the_comparison_equation():
     np.testing.assert_allclose(slope[1:-1], (2.0 - 0.5 * envelope)[1:-1], atol=1e-3)
 
 
-def closed_loop(start, sigma):
-    """Simulate eq. (9), err1, with the law and a constant sigma (3,): 1 kHz, 10 s."""
-    law, dt, steps = ModularLaw(LAW), 0.001, 10_000
+def closed_loop(parameters, start, sigma):
+    """Simulate eq. (9), err1, with the law and a constant sigma (3,): 1 kHz, 10 s.
+
+    Returns time, and rows of e, e_dot, K0..K3, zeta, theta_hat.
+    """
+    law, dt, steps = ModularLaw(parameters), 0.001, 10_000
     e, e_dot = np.array(start, float), np.zeros(3)
     rows = []
     for _ in range(steps):
         xi = np.sqrt(e @ e + e_dot @ e_dot)
-        rows.append([*e, *e_dot, *law.adaptation[:5]])
+        rows.append([*e, *e_dot, *law.adaptation[:5], *law.bias])
         tau = law.update(e, e_dot, np.zeros(3), np.array([xi, 0.0, 0.0]), False, dt)
         e_dot = e_dot + dt * (tau + sigma)
         e = e + dt * e_dot
     return dt * np.arange(steps), np.array(rows)
 
 
-def test_v_falls_outside_the_bound_and_stays_within():
-    sigma = np.array([0.6, 0.0, -0.8])
-    time, rows = closed_loop([3.0, -2.0, 1.0], sigma)
-    star = np.array([1.0, 0.0, 0.0, 0.0])  # ||sigma|| = 1
-    zeta = rows[:, 10]
+@pytest.mark.parametrize("leakage", [0.0, 0.05])
+@pytest.mark.parametrize("law", [LAW, MENDED])
+def test_v_falls_outside_the_bound_and_stays_within(law, leakage):
+    law, sigma = replace(law, bias_leakage=leakage), np.array([0.6, 0.0, -0.8])
+    time, rows = closed_loop(law, [3.0, -2.0, 1.0], sigma)
+    # ||sigma|| = 1: K*0 bounds it, or theta takes it
+    theta = sigma if law.bias_gain[0] else np.zeros(3)
+    star = np.array([np.linalg.norm(sigma - theta), 0.0, 0.0, 0.0])
+    gains, zeta = rows[:, 6:10], rows[:, 10]
     truth = tracking_of(rows[:, :3], rows[:, 3:6])
-    parts = lyapunov_bound.parts("position", LAW.record()[0], truth, rows[:, 6:10], zeta, star)
-    found = stability.check(time, parts.total, lyapunov_bound.comparison(LAW, zeta, star))
+    parts = lyapunov_bound.parts(
+        "position", law.record()[0], truth, gains, zeta, star, rows[:, 11:] - theta
+    )
+    coarse = lyapunov_bound.comparison(law, zeta, star, theta)
+    found = stability.check(time, parts.total, coarse)
     assert np.all(parts.total > 0.0)
     assert found["start"] > 1.5 * found["bound"]
     assert found["falls_above_bound"] == 1.0
     assert found["within_bound"] == found["within_envelope"] == 1.0
     assert found["rate_inequality_holds"] == 1.0
     assert parts.total[-1] < found["bound"]
-    sharper = lyapunov_bound.decrease("position", LAW, truth, rows[:, 6:10], zeta, star)
-    assert np.all(np.gradient(parts.total, time) <= sharper)
-    coarse = lyapunov_bound.comparison(LAW, zeta, star)
+    sharper = lyapunov_bound.decrease("position", law, truth, gains, zeta, star, theta)
+    assert np.all(np.gradient(parts.total, time) <= sharper + 1e-9)
     assert np.all(sharper <= -coarse.rate * parts.total + coarse.growth + 1e-9)
+
+
+def test_theta_hat_takes_a_constant_coupling():
+    """The printed law keeps an error; with theta_hat the error goes and theta_hat is sigma."""
+    sigma = np.array([0.6, 0.0, -0.8])
+    (_, printed), (_, mended) = (closed_loop(p, np.zeros(3), sigma) for p in (LAW, MENDED))
+    assert np.linalg.norm(mended[-1, :3]) < 0.1 * np.linalg.norm(printed[-1, :3])
+    np.testing.assert_allclose(mended[-1, 11:], sigma, atol=0.1)
 
 
 def test_a_v_that_leaves_its_bound_is_reported():

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from uam_control.laws.modular import ModularParameters
 from uam_lab.analysis.coupling import Coupling, nominal_inertia
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, Supply
@@ -25,6 +26,16 @@ def regressor(truth: Tracking) -> np.ndarray:
     """Return 1, ||xi||, ||xi||^2, ||chi_ddot|| (m, 4), the factors of K*0..K*3 in eq. (11)."""
     xi = truth.xi
     return np.column_stack([np.ones_like(xi), xi, xi**2, truth.acceleration])
+
+
+def steady(sigma: np.ndarray, parameters: ModularParameters) -> np.ndarray:
+    """Return theta_j (n,), what theta_hat_j can take of sigma (m, n) [m/s^2 or rad/s^2].
+
+    The mean of the flight, within the ball of `bias_limit`, for the axes with `bias_gain`.
+    """
+    found = np.where(np.array(parameters.bias_gain) > 0.0, sigma.mean(axis=0), 0.0)
+    length = float(np.linalg.norm(found))
+    return found * min(1.0, parameters.bias_limit / length) if length else found
 
 
 def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -9,6 +9,12 @@ For V = V_p + V_q + V_alpha, eq. (31), the same holds with rate = min rate_j and
 growth = sum growth_j, eq. (51), new: V <= max(V(0), B), B = growth / (rate - kappa) for any
 0 < kappa < rate. The limit kappa -> 0 gives the smallest bound and is used here.
 
+With `bias_gain` (docs/law.md) V_j gains 1/2 theta~_j^T Gamma_j^-1 theta~_j, theta~_j =
+theta_hat_j - theta_j, where theta_j is the constant part of sigma_j; K* then bounds sigma_j - theta_j. In dV_j/dt
+the new term takes theta~_j^T r_j away that the constant part adds, and projection adds nothing.
+Leakage adds 1/2 leakage theta_j^T Gamma_j^-1 theta_j. As for zeta, growth_j gains rate_j times the
+largest value of the term, because without leakage it has no decrease of its own.
+
 growth contains epsilon_j at every tick, as in eq. (44). Eq. (41), subs_6p, for ||r_j|| >= varpi_j,
 has no epsilon_j.
 """
@@ -48,16 +54,17 @@ class ComparisonSystem:
 
 @dataclass(frozen=True)
 class Parts:
-    """The three terms of V_j, each (m,)."""
+    """The terms of V_j, each (m,)."""
 
     tracking: np.ndarray
     gains: np.ndarray
     zeta: np.ndarray
+    bias: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
         """Return V_j (m,)."""
-        return self.tracking + self.gains + self.zeta
+        return self.tracking + self.gains + self.zeta + self.bias
 
 
 def parts(
@@ -67,15 +74,25 @@ def parts(
     gains: np.ndarray,
     zeta: np.ndarray,
     constants: np.ndarray,
+    bias_error: np.ndarray,
 ) -> Parts:
     """Return V_j of one subsystem, eq. (32) to (34).
 
-    record: parameter record of its law; gains (m, 4): K_j0..K_j3; zeta (m,); constants (4,): K*.
+    record: parameter record of its law; gains (m, 4): K_j0..K_j3; zeta (m,); constants (4,): K*;
+    bias_error (m, n): theta~ [m/s^2 or rad/s^2], axes without `bias_gain` do not count.
     """
     columns = COLUMNS_OF[subsystem]
     e, e_dot = truth.e[:, columns], truth.e_dot[:, columns]
     square = e**2 @ record["p11"] + 2.0 * (e * e_dot) @ record["p12"] + e_dot**2 @ record["p22"]
-    return Parts(0.5 * square, 0.5 * np.sum((gains - constants) ** 2, axis=1), zeta / np.min(zeta))
+    found = 0.5 * np.sum((gains - constants) ** 2, axis=1)
+    bias = 0.5 * bias_error**2 @ inverse_bias_gain(record)
+    return Parts(0.5 * square, found, zeta / np.min(zeta), bias)
+
+
+def inverse_bias_gain(record: np.ndarray) -> np.ndarray:
+    """Return the diagonal of Gamma^-1 (n,) [s^2]; 0 for an axis without bias."""
+    gain = record["bias_gain"]
+    return np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
 
 
 def decrease(
@@ -85,6 +102,7 @@ def decrease(
     gains: np.ndarray,
     zeta: np.ndarray,
     constants: np.ndarray,
+    theta: np.ndarray,
 ) -> np.ndarray:
     """Return an upper bound of dV_j/dt (m,) [1/s], sharper than -rate_j V_j + growth_j.
 
@@ -97,21 +115,34 @@ def decrease(
     square = truth.e[:, columns] ** 2 @ np.array(parameters.q_position)
     square += truth.e_dot[:, columns] ** 2 @ np.array(parameters.q_velocity)
     pulled = ((gains - constants) ** 2 - constants**2) @ nu
-    return -0.5 * (square + pulled) + parameters.epsilon / float(zeta.min())
+    steady = parameters.epsilon / float(zeta.min()) + leaking(parameters, theta)
+    return -0.5 * (square + pulled) + steady
+
+
+def leaking(parameters: ModularParameters, theta: np.ndarray) -> float:
+    """Return what the leakage of theta_hat adds to dV_j/dt at most [1/s]; theta (n,)."""
+    inverse = inverse_bias_gain(parameters.record()[0])
+    return 0.5 * parameters.bias_leakage * float(inverse @ theta**2)
 
 
 def comparison(
-    parameters: ModularParameters, zeta: np.ndarray, constants: np.ndarray
+    parameters: ModularParameters,
+    zeta: np.ndarray,
+    constants: np.ndarray,
+    theta: np.ndarray,
 ) -> ComparisonSystem:
-    """Return rate_j and growth_j of one subsystem, eq. (44), from zeta (m,) and K* (4,).
+    """Return rate_j and growth_j of one subsystem, eq. (44), from zeta (m,), K* (4,), theta (n,).
 
-    zeta_min and zeta_max are the extremes of zeta in this flight.
+    zeta_min and zeta_max are the extremes of zeta in this flight. theta_hat is within its ball.
     """
     record, nu = parameters.record()[0], np.array(parameters.nu)
     smallest_q = min(*parameters.q_position, *parameters.q_velocity)
     rate = min(smallest_q, nu.min()) / max(eigenvalues(record)[1], 1.0)
     low, high = float(zeta.min()), float(zeta.max())
     growth = rate * high / low + parameters.epsilon / low + 0.5 * float(nu @ constants**2)
+    farthest = parameters.bias_limit + float(np.linalg.norm(theta))
+    growth += rate * 0.5 * inverse_bias_gain(record).max() * farthest**2
+    growth += leaking(parameters, theta)
     return ComparisonSystem(float(rate), float(growth))
 
 

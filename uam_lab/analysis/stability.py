@@ -40,6 +40,7 @@ class Subsystem:
     decrease: np.ndarray  # (m,) upper bound of dV_j/dt, see lyapunov.decrease
     gains: np.ndarray  # (m, 4) K0..K3 as flown
     zeta: np.ndarray  # (m,)
+    theta: np.ndarray  # (n,) constant part of sigma_j that theta_hat_j can take
     error: np.ndarray  # (m,) ||xi_j||
     error_bound: float  # bound of ||xi_j|| from V_j <= max(V_j(0), B_j)
 
@@ -86,6 +87,7 @@ class Stability:
                 "K_max": s.gains.max(axis=0),
                 "zeta_min": s.zeta.min(),
                 "zeta_max": s.zeta.max(),
+                "theta": s.theta,
                 "sigma_max": self.coupling.sigma_norm(name).max(),
                 "coupling": shares(self.coupling, self.supply, columns),
             }
@@ -169,10 +171,11 @@ def analyse(series: Series, sets: dict, vehicle: Vehicle, payload_mass: float) -
     subsystems, ceilings, seen = {}, {}, {}
     for name in SUBSYSTEMS:
         parameters = sets[NODE_OF[name]]
-        sigma = forces.sigma_norm(name)
+        theta = constants.steady(forces.sigma[:, COLUMNS_OF[name]], parameters)
+        sigma = np.linalg.norm(forces.sigma[:, COLUMNS_OF[name]] - theta, axis=1)
         best = constants.smallest(sigma, regressors, np.array(parameters.nu))
         printed_ones = constants.from_the_paper(name, true, forces, terms, truth, sets)
-        found = _subsystem(name, series, rows, truth, parameters, best, printed_ones)
+        found = _subsystem(name, series, rows, truth, parameters, (best, printed_ones), theta)
         subsystems[name] = found
         ceilings[name] = assumptions.at_ceiling(found.gains, parameters.k_ceiling)
         seen[name] = assumptions.acceleration(series, rows, truth, parameters)
@@ -194,16 +197,18 @@ def _subsystem(
     rows: np.ndarray,
     truth: tracking.Tracking,
     parameters: ModularParameters,
-    best: np.ndarray,
-    printed_ones: np.ndarray,
+    found: tuple[np.ndarray, np.ndarray],
+    theta: np.ndarray,
 ) -> Subsystem:
-    """Return V_j and its bound for the constants K* `best` (4,); parameters: of this subsystem."""
+    """Return V_j and its bound; parameters: of this subsystem; found: K* (4,), used and printed."""
+    best, printed_ones = found
     columns = COLUMNS_OF[name]
     gains = np.column_stack([series[f"adaptation.{name}.K{i}"][rows] for i in range(4)])
     zeta = np.maximum(series[f"adaptation.{name}.zeta"][rows], 1e-12)
     record = parameters.record()[0]
-    parts = lyapunov_bound.parts(name, record, truth, gains, zeta, best)
-    comparison = lyapunov_bound.comparison(parameters, zeta, best)
+    bias_error = supply.bias(series, name)[rows] - theta
+    parts = lyapunov_bound.parts(name, record, truth, gains, zeta, best, bias_error)
+    comparison = lyapunov_bound.comparison(parameters, zeta, best, theta)
     largest = max(parts.total[0], comparison.bound)
     xi = np.hstack([truth.e[:, columns], truth.e_dot[:, columns]])
     return Subsystem(
@@ -211,9 +216,10 @@ def _subsystem(
         printed=printed_ones,
         parts=parts,
         comparison=comparison,
-        decrease=lyapunov_bound.decrease(name, parameters, truth, gains, zeta, best),
+        decrease=lyapunov_bound.decrease(name, parameters, truth, gains, zeta, best, theta),
         gains=gains,
         zeta=zeta,
+        theta=theta,
         error=np.linalg.norm(xi, axis=1),
         error_bound=lyapunov_bound.error_bound(record, largest),
     )

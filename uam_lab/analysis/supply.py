@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.control.output_limits import ArmLimits, PositionLimits, integrate
-from uam_control.coordinates import ARM, ATTITUDE, POSITION, Z
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
 from uam_lab.analysis.tracking import Tracking
@@ -48,7 +48,7 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
         r = p["p12"] * e + p["p22"] * e_dot
         length = np.linalg.norm(r, axis=1)
         scale = series[f"adaptation.{name}.rho"][rows] / np.maximum(length, p["varpi"])
-        adaptive[:, columns] = -p["inertia"] * r * scale[:, None]
+        adaptive[:, columns] = -p["inertia"] * (r * scale[:, None] + bias(series, name)[rows])
     limits = sets["position_controller"]
     weight[:, Z] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
@@ -59,6 +59,12 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     feedforward = recorded - feedback - adaptive - weight - integral
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
     return Supply(feedforward, feedback, adaptive, weight, integral, recorded, applied)
+
+
+def bias(series: Series, subsystem: str) -> np.ndarray:
+    """Return theta_hat (ticks, n) [m/s^2 or rad/s^2] as recorded."""
+    axes = range(1, series.columns.size - ALPHA + 1) if subsystem == "arm" else range(1, 4)
+    return np.column_stack([series[f"adaptation.{subsystem}.bias{i}"] for i in axes])
 
 
 def integral_action(series: Series, p: PositionLimits | ArmLimits, columns: slice) -> np.ndarray:

@@ -26,6 +26,9 @@ LOWEST = 1e-6  # lower limit of the drawn tracking term, which may be zero
 MEAN_S = 0.2  # [s] averaging time of the forces, against the noise of the estimate
 COUPLING, ADAPTIVE, FEEDBACK, INTEGRAL = style.INK, *style.FLIGHTS[:3]
 ACTUATORS = "#9aa5af"
+TERMS = dict(
+    zip(("tracking", "gains", "$\\zeta$", "$\\hat\\theta$"), np.roll(style.GAINS, -1), strict=True)
+)
 
 
 def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
@@ -39,7 +42,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     total.set_ylabel("$V$", parse_math=True)
     for axis, name in zip(each, SUBSYSTEMS, strict=True):
         subsystem = found.subsystems[name]
-        for values, colour in zip(_terms(subsystem), style.GAINS[1:], strict=True):
+        for values, colour in zip(_terms(subsystem), TERMS.values(), strict=True):
             axis.plot(
                 *panels.thin(found.time, np.maximum(values, LOWEST)), color=colour, linewidth=0.9
             )
@@ -47,9 +50,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
         axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$", parse_math=True)
     handles = [
         style.key("$V$", style.INK, 1.5),
-        style.key("tracking", style.GAINS[1]),
-        style.key("gains", style.GAINS[2]),
-        style.key("$\\zeta$", style.GAINS[3]),
+        *(style.key(term, colour) for term, colour in TERMS.items()),
         style.key("bound by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
         style.key("ultimate bound", style.DROP, 1.0, BOUND),
     ]
@@ -118,8 +119,9 @@ def _only(flights: Sequence[DrawnFlight]):
     return flights[0].stability if len(flights) == 1 else None
 
 
-def _terms(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return subsystem.parts.tracking, subsystem.parts.gains, subsystem.parts.zeta
+def _terms(subsystem: Subsystem) -> tuple[np.ndarray, ...]:
+    parts = subsystem.parts
+    return parts.tracking, parts.gains, parts.zeta, parts.bias
 
 
 def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: ComparisonSystem) -> None:
