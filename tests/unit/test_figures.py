@@ -9,7 +9,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import analyse
 from uam_lab.records.results import metrics
 from uam_lab.records.results.timeseries import Series, gain_columns
-from uam_lab.report.figures import figures, panels
+from uam_lab.report.figures import figures, panels, style
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_sim_bridge.plant import Vehicle
 
@@ -116,6 +116,14 @@ def test_a_law_without_adaptation_has_no_adaptation_figure(flight):
     values[:, COLUMNS.block("adaptation.")] = np.nan
     series = Series(values, flight.phases, flight.phase_names, flight.info, flight.columns)
     assert figures.adaptation([DrawnFlight("other", series)]) is None
+
+
+def test_powers_of_ten_at_an_axis_are_no_source_code(flight, tmp_path):
+    figure = figures.adaptation([DrawnFlight("modular", flight)])
+    style.save(figure, tmp_path / "adaptation.png")
+    labels = [text for axis in figure.axes for text in axis.yaxis.get_ticklabels()]
+    powers = [text for text in labels if "mathdefault" in text.get_text()]
+    assert powers and all(text.get_parse_math() for text in powers)
 
 
 def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):

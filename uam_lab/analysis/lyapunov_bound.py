@@ -10,10 +10,10 @@ growth = sum growth_j, eq. (51), new: V <= max(V(0), B), B = growth / (rate - ka
 0 < kappa < rate. The limit kappa -> 0 gives the smallest bound and is used here.
 
 With `bias_gain` (docs/law.md) V_j gains 1/2 theta~_j^T Gamma_j^-1 theta~_j, theta~_j =
-theta_hat_j - theta_j, where theta_j is the constant part of sigma_j; K* then bounds sigma_j - theta_j. In dV_j/dt
-the new term takes theta~_j^T r_j away that the constant part adds, and projection adds nothing.
-Leakage adds 1/2 leakage theta_j^T Gamma_j^-1 theta_j. As for zeta, growth_j gains rate_j times the
-largest value of the term, because without leakage it has no decrease of its own.
+theta_hat_j - theta_j, where theta_j is the constant part of sigma_j; K* then bounds sigma_j -
+theta_j. In dV_j/dt the new term takes theta~_j^T r_j away that the constant part adds, and
+projection adds nothing. Leakage adds 1/2 leakage theta_j^T Gamma_j^-1 theta_j. As for zeta,
+growth_j gains rate_j times the largest value of the term: without leakage it has no decrease.
 
 growth contains epsilon_j at every tick, as in eq. (44). Eq. (41), subs_6p, for ||r_j|| >= varpi_j,
 has no epsilon_j.

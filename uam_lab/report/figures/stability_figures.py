@@ -43,6 +43,8 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     for axis, name in zip(each, SUBSYSTEMS, strict=True):
         subsystem = found.subsystems[name]
         for values, colour in zip(_terms(subsystem), TERMS.values(), strict=True):
+            if not values.any():
+                continue
             axis.plot(
                 *panels.thin(found.time, np.maximum(values, LOWEST)), color=colour, linewidth=0.9
             )
@@ -51,7 +53,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     handles = [
         style.key("$V$", style.INK, 1.5),
         *(style.key(term, colour) for term, colour in TERMS.items()),
-        style.key("bound by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
+        style.key("$\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
         style.key("ultimate bound", style.DROP, 1.0, BOUND),
     ]
     panels.finish(figure, axes, flights, handles)

@@ -80,6 +80,7 @@ def flight_colour(number: int) -> str:
 
 def save(figure: Figure, path: Path, **how: Any) -> None:
     """Write a figure atomically; how: see `Figure.savefig`."""
+    _powers(figure)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=PIXELS_PER_INCH, **how)
 
@@ -95,6 +96,15 @@ def note(
     """Write a text at (x of the data, height of the panel), shifted by points."""
     how = {"xycoords": ("data", "axes fraction"), **how}
     axis.annotate(text, at, xytext=shift, textcoords="offset points", **how)
+
+
+def _powers(figure: Figure) -> None:
+    """Let the numbers at logarithmic axes be formulas: matplotlib writes them as powers of ten."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() in ("log", "symlog"):
+                for text in axis.get_ticklabels(which="both"):
+                    text.set_parse_math(True)
 
 
 def formulas(artist: Artist) -> None:
