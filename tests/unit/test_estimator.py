@@ -59,6 +59,7 @@ def started(**parameters) -> StateEstimator:
     estimator.imu(0.0, NOTHING, WEIGHT)
     estimator.mocap(0.0, np.array([1.0, 2.0, 3.0]), LEVEL)
     estimator.joints(0.0, np.array([0.3, -0.2]), np.array([1.0, -2.0]))
+    estimator.update()
     return estimator
 
 

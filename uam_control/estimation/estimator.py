@@ -8,25 +8,32 @@ low-pass filtered; the corner frequencies are parameters.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.ages import AHEAD
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.estimation.base import BaseParameters, Estimator
-from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
+from uam_control.estimation.base import Estimator
+from uam_control.estimation.estimator_parameters import OBSERVER, EstimatorParameters
+from uam_control.estimation.filters import (
+    derivative_step,
+    joint_step,
+    low_pass_step,
+    observer_step,
+)
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     FilterArrays,
     PoseFilter,
-    allowed_bandwidth,
     begin_anew,
-    correct_at,
+    correct_waiting,
     parts_of,
     predict_next,
+    wait,
 )
 from uam_control.estimation.pose_gate import settled, suspend
+from uam_control.estimation.waiting import drop_first, make_room
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import record
 from uam_control.maths.rotations import (
@@ -34,81 +41,41 @@ from uam_control.maths.rotations import (
     matrix_from_quaternion,
     rotate_back,
 )
-from uam_control.settings.parameter_set import choice, number
 
 # rad/s; the noise of the estimated bias grows with the cube of the bandwidth
 QUIET_BANDWIDTH = 24.0
 LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
-
-
-@dataclass(frozen=True)
-class EstimatorParameters(BaseParameters):
-    """Bandwidths and corner frequencies of the estimator's filters, and gravity."""
-
-    estimator: str = choice(
-        "complementary", "the estimator that flies, fixed", ("complementary",), fixed=True
-    )
-    position_bandwidth: float = number(
-        12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
-    )
-    attitude_bandwidth: float = number(
-        8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
-    )
-    pose_gate: float = number(
-        0.15, "jump of the motion capture from which its poses are rejected", "m", 0.05, 1000.0
-    )
-    joint_bandwidth: float = number(
-        60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0
-    )
-    joint_velocity_weight: float = number(
-        80.0, "correction of joint state by the encoder velocity", "1/s", 0.0, 200.0
-    )
-    acceleration_cutoff: float = number(
-        5.0, "low-pass on the acceleration of the vehicle", "Hz", 0.1, 100.0
-    )
-    angular_acceleration_cutoff: float = number(
-        10.0, "low-pass on the derivative of the body rates", "Hz", 0.1, 100.0
-    )
-    joint_acceleration_cutoff: float = number(
-        5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
-    )
-
-    def capped(self, interval: float) -> list[str]:
-        """Return a line per bandwidth that is too large for a pose every `interval` [s]."""
-        allowed = allowed_bandwidth(interval)
-        given = ("position_bandwidth", "attitude_bandwidth")
-        why = f"{allowed:.3g}: a pose comes every {1e3 * interval:.3g} ms"
-        return [
-            f"{name} {value:g} rad/s acts as {why}"
-            for name in given
-            if (value := getattr(self, name)) > allowed
-        ]
+READINGS = 16  # of the joints, that wait for the end of their tick at most
 
 
 class EstimatorArrays(NamedTuple):
-    """State of a `StateEstimator`: of its `PoseFilter`; memory: see `arrays_of`; numbers (1,): see
-    WHOLE, REAL."""
+    """State of a `StateEstimator`: of its `PoseFilter`; memory: see `arrays_of`; readings
+    (READINGS, 1 + 2 n): stamp, angles and velocities of those that wait, in order; numbers (1,):
+    see WHOLE, REAL."""
 
     pose: FilterArrays
     memory: np.ndarray
+    readings: np.ndarray
     numbers: np.ndarray
 
 
-# started: whether a pose has come. Stamps of the newest samples [s], NaN before the first; period
-# [s]: of the newest IMU sample; then the parameters
-WHOLE = "started"
+# started: whether a pose has come; waiting: number of readings; observed: whether an observer makes
+# the velocities of the joints. Stamps of the newest samples [s], NaN before the first, start: of
+# the pose at which the estimate began; period [s]: of the newest IMU sample; then the parameters
+WHOLE = "started waiting observed"
 REAL = (
-    "imu_stamp joint_stamp period "
-    "angular_cutoff linear_cutoff joint_bandwidth velocity_weight joint_cutoff bandwidth"
+    "imu_stamp joint_stamp start period angular_cutoff linear_cutoff "
+    "joint_bandwidth velocity_weight observer_bandwidth joint_cutoff bandwidth"
 )
 
 
 class StateEstimator(Estimator):
     """Estimates chi, chi_dot, chi_ddot.
 
-    Pass the samples in order of arrival by `mocap`, `imu` and `joints`; `update` returns the state
-    at the stamp of the newest IMU sample. `imu_update` is both, in less time. `arrays`: the whole
-    state; they are never replaced.
+    Pass the samples by `mocap`, `imu` and `joints` as they arrive. Poses and readings wait for the
+    next IMU sample or `update`, and are then used in the order of their stamps. `update` returns
+    the state at the stamp of the newest IMU sample. `imu_update` is both, in less time. `arrays`:
+    the whole state; they are never replaced.
     """
 
     kind = EstimatorParameters
@@ -118,7 +85,8 @@ class StateEstimator(Estimator):
         p = parameters
         self._pose = PoseFilter(p.position_bandwidth, p.attitude_bandwidth, p.pose_gate, p.gravity)
         self.memory = record(WHOLE, REAL)
-        self.arrays = EstimatorArrays(self._pose.arrays, np.zeros(memory_size(joints)), self.memory)
+        memory, readings = np.zeros(memory_size(joints)), np.zeros((READINGS, 1 + 2 * joints))
+        self.arrays = EstimatorArrays(self._pose.arrays, memory, readings, self.memory)
         self.set_parameters(parameters)
         forget_samples(self.arrays)
         self._state, *_ = arrays_of(self.arrays.memory)
@@ -127,7 +95,7 @@ class StateEstimator(Estimator):
         self._imu = prepared(take_imu, a, 0.0, sample, sample)
         self._joints = prepared(take_joints, a, 0.0, angles, angles)
         self._write_biases = prepared(write_biases, a.pose.memory, np.empty((2, 3)))
-        self._assemble = prepared(assemble_stored, a)
+        self._settle, self._assemble = (prepared(f, a) for f in (settle, assemble_stored))
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         """Use `parameters` (validated) from the next sample on."""
@@ -138,16 +106,19 @@ class StateEstimator(Estimator):
         m = self.memory[0]
         m.angular_cutoff, m.linear_cutoff = p.angular_acceleration_cutoff, p.acceleration_cutoff
         m.joint_bandwidth, m.velocity_weight = p.joint_bandwidth, p.joint_velocity_weight
+        m.observed, m.observer_bandwidth = p.joint_velocity == OBSERVER, p.joint_observer_bandwidth
         m.joint_cutoff, m.bandwidth = p.joint_acceleration_cutoff, p.position_bandwidth
 
     @property
     def refused_poses(self) -> int:
         """Return the number of poses rejected because of a jump."""
+        self._settle(self.arrays)
         return self._pose.gate.refused
 
     @property
     def waiting_for(self) -> list[str]:
         """Return the names of the inputs without any sample so far."""
+        self._settle(self.arrays)
         m = self.memory[0]
         seen = {
             "imu": not math.isnan(m.imu_stamp),
@@ -201,6 +172,7 @@ class StateEstimator(Estimator):
 
     def update(self) -> np.ndarray:
         """Return the state (3, 6 + n) at the newest IMU stamp; the next call reuses the array."""
+        self._settle(self.arrays)
         self._assemble(self.arrays)
         return self._state
 
@@ -241,7 +213,8 @@ def arrays_of(
 def forget_samples(a: EstimatorArrays) -> None:
     """Begin anew; parameters stay."""
     m = a.numbers[0]
-    m.started, m.period = 0, 0.0
+    m.started = m.waiting = 0
+    m.period = 0.0
     m.imu_stamp = m.joint_stamp = math.nan
     a.memory[:] = 0.0
     begin_anew(a.pose)
@@ -256,12 +229,12 @@ def take_mocap(
     position (3,) [m, world]; quaternion (4,) body → world [w x y z].
     """
     m = a.numbers[0]
-    if not m.started:
+    if not a.pose.numbers[0].count and not (m.started and stamp < m.start):
         motion, _, _ = parts_of(a.pose.memory)
         motion.position[:] = position
         motion.quaternion[:] = quaternion
-        m.started = 1
-    correct_at(a.pose, stamp, position, quaternion)
+        m.started, m.start = 1, stamp
+    wait(a.pose, stamp, position, quaternion)
 
 
 @jit
@@ -272,6 +245,7 @@ def take_imu(
 
     gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
     """
+    follow_waiting(a)
     m = a.numbers[0]
     first, step = math.isnan(m.imu_stamp), stamp - m.imu_stamp
     m.imu_stamp = stamp
@@ -285,18 +259,58 @@ def take_imu(
 
 @jit
 def take_joints(a: EstimatorArrays, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-    """Process joint readings at `stamp` [s]: alpha (n,) [rad], alpha_dot (n,) [rad/s].
+    """Let joint readings at `stamp` [s] wait: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
+    m, n = a.numbers[0], len(alpha)
+    if m.waiting == READINGS:
+        m.waiting = drop_first(a.readings, m.waiting)
+    place = make_room(a.readings, m.waiting, stamp)
+    a.readings[place, 1 : 1 + n] = alpha
+    a.readings[place, 1 + n :] = alpha_dot
+    m.waiting += 1
 
-    Writes the accelerations into the state.
+
+@jit
+def settle(a: EstimatorArrays) -> None:
+    """Use what waits and is not newer than the newest IMU sample."""
+    follow_waiting(a)
+    correct_waiting(a.pose)
+
+
+@jit
+def follow_waiting(a: EstimatorArrays) -> None:
+    """Use the joint readings that wait, in the order of their stamps."""
+    m, n = a.numbers[0], (a.readings.shape[1] - 1) // 2
+    for i in range(m.waiting):
+        row = a.readings[i]
+        follow_joints(a, row[0], row[1 : 1 + n], row[1 + n :])
+        row[:] = 0.0  # used readings are no state of the estimator
+    m.waiting = 0
+
+
+@jit
+def follow_joints(
+    a: EstimatorArrays, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray
+) -> None:
+    """Use joint readings, see `take_joints`; write the accelerations into the state.
+
+    One that is a little older than the newest is ignored; with older ones the clock has been set.
     """
     m = a.numbers[0]
-    first, dt = math.isnan(m.joint_stamp), min(max(stamp - m.joint_stamp, 0.0), LONGEST_STEP)
+    first, since = math.isnan(m.joint_stamp), stamp - m.joint_stamp
+    if -AHEAD < since <= 0.0:
+        return
     m.joint_stamp = stamp
     state, joints, joints_filter, _, _ = arrays_of(a.memory)
     if first:
-        joints[0], joints[1] = alpha, alpha_dot
+        joints[0] = alpha
+        if not m.observed:
+            joints[1] = alpha_dot
         return
-    joint_step(alpha, alpha_dot, m.joint_bandwidth, m.velocity_weight, dt, joints)
+    dt = min(max(since, 0.0), LONGEST_STEP)
+    if not m.observed:
+        joint_step(alpha, alpha_dot, m.joint_bandwidth, m.velocity_weight, dt, joints)
+    elif since > 0.0:
+        observer_step(alpha, m.observer_bandwidth, since, joints)
     derivative_step(joints[1], m.joint_cutoff, dt, joints_filter, state[CHI_DDOT, ALPHA:])
 
 
@@ -324,7 +338,10 @@ def write_biases(pose: np.ndarray, found: np.ndarray) -> None:
 
 @jit
 def assemble_stored(a: EstimatorArrays) -> None:
-    """Write the state into memory, see `arrays_of` and `assemble`."""
+    """Write the state into memory, see `arrays_of` and `assemble`.
+
+    An observer's angles are those at the stamp of the IMU sample.
+    """
     m = a.numbers[0]
     motion, _, _ = parts_of(a.pose.memory)
     state, joints, _, rates_filter, acceleration = arrays_of(a.memory)
@@ -332,6 +349,10 @@ def assemble_stored(a: EstimatorArrays) -> None:
         *(motion, joints, m.period, m.angular_cutoff, m.linear_cutoff),
         *(rates_filter, acceleration, state),
     )
+    if m.observed and not math.isnan(m.imu_stamp):
+        late = min(max(m.imu_stamp - m.joint_stamp, -LONGEST_STEP), LONGEST_STEP)
+        for i in range(joints.shape[1]):
+            state[CHI, ALPHA + i] += late * joints[1, i]
 
 
 @jit

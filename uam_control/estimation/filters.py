@@ -9,6 +9,7 @@ import numpy as np
 from uam_control.maths.compiled import jit
 
 VALUE, RATE = range(2)  # rows of a second-order filter's state
+ROUND = 2.0 * math.pi  # rad
 # (bandwidth + velocity_weight / 2) × step of the joint observer: below 1 it is stable for all gains
 LARGEST_GAIN = 0.8
 
@@ -69,3 +70,24 @@ def joint_step(
                 bandwidth * bandwidth * innovation
                 + velocity_weight * (velocity[i] - state[RATE, i])
             )
+
+
+@jit
+def observer_step(angle: np.ndarray, bandwidth: float, dt: float, state: np.ndarray) -> None:
+    """Advance a tracking loop of the joints by dt [s], above 0, from encoder angles alone.
+
+    angle (n,) [rad]: readings; state (2, n): estimated angle [rad] and velocity [rad/s]. The loop
+    has two poles at bandwidth [Hz], damped by sqrt(1/2), mapped exactly to dt: it is stable with
+    any. Its velocity is sqrt(2) / (2 pi bandwidth) - dt / 2 late. A reading that has gone round
+    is followed on.
+    """
+    part = math.sqrt(0.5) * ROUND * bandwidth * dt
+    decay = math.exp(-part)
+    to_value = 1.0 - decay * decay
+    to_rate = (1.0 + decay * decay - 2.0 * decay * math.cos(part)) / dt
+    for i in range(len(angle)):
+        state[VALUE, i] += dt * state[RATE, i]
+        innovation = angle[i] - state[VALUE, i]
+        innovation -= ROUND * np.rint(innovation / ROUND)
+        state[VALUE, i] += to_value * innovation
+        state[RATE, i] += to_rate * innovation

@@ -18,6 +18,7 @@ from uam_control.estimation.history import OLDEST_MATCH, value_at
 from uam_control.estimation.pose_clock import PoseClock, counts, forget_clock, waits
 from uam_control.estimation.pose_gate import PoseGate, forget_rejections, rejects
 from uam_control.estimation.repeats import Repeats, repeated
+from uam_control.estimation.waiting import drop_first, make_room
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (
@@ -183,25 +184,41 @@ def begin_anew(a: FilterArrays) -> None:
 def predict_next(
     a: FilterArrays, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
 ) -> None:
-    """Integrate an IMU sample over dt [s]; then correct with the poses that waited for it.
+    """Integrate an IMU sample over dt [s], between the poses that wait: before it and up to it.
 
     stamp [s]: of the sample; gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
     """
+    correct_waiting(a)
     m = a.numbers[0]
     row = m.count % HISTORY
     m.count += 1
     motion, stamps, poses = parts_of(a.memory)
     stamps[row] = stamp
     predict(dt, m.gravity, gyro, specific_force, motion, poses, row)
-    while m.waiting and a.ahead[0, 0] <= stamp:
+    correct_waiting(a)
+
+
+@jit
+def newest_stamp(a: FilterArrays) -> float:
+    """Return the stamp [s] of the newest prediction, -inf before the first."""
+    return parts_of(a.memory)[1][(a.numbers[0].count - 1) % HISTORY]
+
+
+@jit
+def correct_waiting(a: FilterArrays) -> None:
+    """Correct with the poses that wait, in the order of their stamps, up to the newest prediction's
+    stamp."""
+    m = a.numbers[0]
+    newest = newest_stamp(a)
+    while m.waiting and a.ahead[0, 0] <= newest:
         at, pose = a.ahead[0, 0], a.ahead[0, 1:].copy()
-        drop_first(a)
+        m.waiting = drop_first(a.ahead, m.waiting)
         correct_stored(a, at, pose[:TURN], pose[TURN:])
 
 
 @jit
-def correct_at(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-    """Correct with a pose exposed at `stamp` [s].
+def wait(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Let a pose exposed at `stamp` [s] wait for `correct_waiting`.
 
     position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
     older than the stored predictions, has a wrong clock (`PoseClock`), repeats the last pose
@@ -209,43 +226,29 @@ def correct_at(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: 
     than the newest prediction waits for the IMU. A stored prediction is compared with one pose:
     beside a gap of the IMU the same difference would count several times.
     """
-    m = a.numbers[0]
-    last = parts_of(a.memory)[1][(m.count - 1) % HISTORY]
-    if not stamp > last:
-        correct_stored(a, stamp, position, quaternion)
-    elif m.count:
-        wait(a, stamp, last, position, quaternion)
-
-
-@jit
-def wait(
-    a: FilterArrays, stamp: float, newest: float, position: np.ndarray, quaternion: np.ndarray
-) -> None:
-    """Let a pose of `stamp` [s] wait for its IMU sample, newer than `newest` [s], if it counts."""
-    m = a.numbers[0]
-    if not waits(a.clock, stamp, newest, m.waiting > 0):
-        m.waiting = 0
+    m, newest = a.numbers[0], newest_stamp(a)
+    if not m.count:
+        return
+    if stamp > newest and not waits(
+        a.clock, stamp, newest, m.waiting > 0 and a.ahead[m.waiting - 1, 0] > newest
+    ):
+        while m.waiting and a.ahead[m.waiting - 1, 0] > newest:
+            m.waiting -= 1
         a.gate[0].refused += 1
         return
     if m.waiting == HISTORY:
-        drop_first(a)
-    place = m.waiting
-    while place and a.ahead[place - 1, 0] > stamp:
-        a.ahead[place] = a.ahead[place - 1]
-        place -= 1
-    a.ahead[place, 0] = stamp
+        m.waiting = drop_first(a.ahead, m.waiting)
+    place = make_room(a.ahead, m.waiting, stamp)
     a.ahead[place, 1 : 1 + TURN] = position
     a.ahead[place, 1 + TURN :] = quaternion
     m.waiting += 1
 
 
 @jit
-def drop_first(a: FilterArrays) -> None:
-    """Forget the oldest pose that waits."""
-    m = a.numbers[0]
-    m.waiting -= 1
-    for i in range(m.waiting):
-        a.ahead[i] = a.ahead[i + 1]
+def correct_at(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """Correct with a pose, see `wait`, as soon as its IMU sample is there."""
+    wait(a, stamp, position, quaternion)
+    correct_waiting(a)
 
 
 @jit

@@ -17,6 +17,7 @@ from uam_control.estimation.estimator import (
     bias_known,
     complete,
     forget_samples,
+    settle,
     take_imu,
     take_joints,
     take_mocap,
@@ -220,6 +221,7 @@ def take_sample(a: StageArrays, stamp: int, gyro: np.ndarray, force: np.ndarray)
     if begun != STATE:
         return begun
     m, tick = a.numbers[0], a.ticks[0].stamp
+    settle(a.estimator)
     m.bias_due = m.bias_due and bias_known(a.estimator)
     take_imu(a.estimator, tick / SECOND, gyro, force)
     if m.waiting:
