@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import deque
 
 import pytest
+import yaml
 
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_control.settings.configuration import path
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.metrics import compute
 from uam_lab.records.results.outcome import grasp_decisions
@@ -78,3 +80,29 @@ def test_a_payload_beside_its_stand_is_a_shortfall():
     info = {"payload_mass_kg": 0.2, "grasps": told}
     (shortfall,) = compute(a_flight.recording.series(), info)["shortfalls"]
     assert shortfall.startswith("payload absent, not within 0.08 m of its place; payload at (")
+
+
+def test_a_payload_is_picked_from_a_table_by_the_scenario_alone(tmp_path):
+    """0.2 m lower than the stand, 0.5 m to the left, another payload: 0.537 + 0.03 + 0.2 = 0.767 m,
+    the height of the usual grip point."""
+    document = yaml.safe_load(path("scenarios/quick_pick.yaml").read_text())
+    for move in document["moves"]:
+        move["to"] = move["to"] - 0.2 if move["coordinate"] == "z" else move.get("to")
+        if move["coordinate"] == "y":
+            move |= {"from": 2, "until": 6, "to": 0.5}
+    document["moves"] = [{k: v for k, v in m.items() if v is not None} for m in document["moves"]]
+    document["environment"] = [
+        {"kind": "table", "position": [-1.0, 0.5], "height": 0.537},
+        {
+            "kind": "payload",
+            "rests_on": "table",
+            "position": [-0.789, 0.5],
+            "size": [0.08, 0.05, 0.03],
+            "material": "steel",
+        },
+    ]
+    file = tmp_path / "table_pick.yaml"
+    file.write_text(yaml.safe_dump(document))
+    a_flight = flight(str(file))
+    a_flight.run()
+    assert grasps(a_flight) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]

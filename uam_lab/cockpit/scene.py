@@ -72,9 +72,10 @@ class SceneNode(UamNode):
         self._frame_period = round(SECOND / options.frame_rate)
         self._marker_period = round(SECOND / options.marker_rate)
         described = described_vehicle(self)
-        vehicle = Vehicle.of(described)
         self._joint_names = described.joint_names
-        self._scenario, model = described_scenario(self, described), vehicle.compile(0.0)
+        self._scenario = described_scenario(self, described)
+        vehicle = Vehicle.of(described).changed(self._scenario.surroundings)
+        model = vehicle.compile(0.0)
         hung = frames(model)
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]

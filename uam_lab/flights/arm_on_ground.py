@@ -1,9 +1,11 @@
-"""Whether the vehicle can stand as a flight begins and ends: its arm above its feet."""
+"""Whether the vehicle can stand as a flight begins and ends: its arm above its feet, and beside
+what stands around it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import mujoco
 import numpy as np
 
 from uam_control.coordinates import ARM, CHI
@@ -13,6 +15,7 @@ from uam_control.mission.scenarios.scenario import standing
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_sim_bridge.plant.arm_geometry import room_below
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
+from uam_sim_bridge.plant.surroundings import overlapping
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 SINKS = 0.005  # [m] by which an arm may reach below the feet: a gear and a floor give way
@@ -30,6 +33,7 @@ def check(vehicle: VehicleDescription, scenario: Scenario, plant: str = DEFAULT_
         if plant == DEFAULT_PLANT:
             raise
         return
+    _check_surroundings(vehicle, scenario)
     start = standing(scenario.arm_start)
     flown = scenario.begun_at(start)
     end = flown.landing.end
@@ -46,6 +50,22 @@ def check(vehicle: VehicleDescription, scenario: Scenario, plant: str = DEFAULT_
                 f"{where} {what}: with joints at {_degrees(angles)} deg the arm reaches "
                 f"{-room:.3f} m below the feet; it must stay above them on the ground"
             )
+
+
+def _check_surroundings(vehicle: VehicleDescription, scenario: Scenario) -> None:
+    """Raise ScenarioError if entries of `environment` intersect each other or the vehicle."""
+    if not scenario.environment:
+        return
+    model = Vehicle.of(vehicle).changed(scenario.surroundings).compile(0.0)
+    data = mujoco.MjData(model)
+    for name, angle in zip(vehicle.joint_names, scenario.arm_start, strict=True):
+        data.joint(name).qpos = angle
+    found = overlapping(model, data, scenario.environment, SINKS)
+    if found is not None:
+        one, other, depth = found
+        raise ScenarioError(
+            f"scenario {scenario.name}: environment: {one} and {other} intersect by {depth:.3f} m"
+        )
 
 
 def _degrees(angles: Sequence[float]) -> str:

@@ -36,6 +36,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "payload_mass_kg": settings.payload_mass,
         "vehicle": settings.vehicle.source,
         "vehicle_changes": settings.vehicle_changes,
+        **scenario.surroundings,
         "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
         "landing_point": list(scenario.landing_point) if scenario.landing_point else None,
         "snapshots": [list(snapshot) for snapshot in scenario.snapshots],

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
+from uam_control.mission.scenarios.environment import ENVIRONMENT, default_environment
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
     Arm,
@@ -24,10 +25,11 @@ from uam_control.vehicle import (
     load_description,
 )
 from uam_sim_bridge.plant.arm_geometry import BASE, SWING, measured_arm
+from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
-PAYLOAD, MAGNET = "payload", "magnet"  # bodies of the MJCF
+MAGNET = "magnet"  # body of the MJCF
 MASS_TOLERANCE = 1e-3  # relative
 LENGTH_TOLERANCE = 1e-3  # [m] of the section `arm`
 LOAD_BELOW = 0.0505  # [m] `variation.tip_mass` below the magnet's pivot: where a payload hangs
@@ -38,7 +40,7 @@ class Vehicle:
     """A description and the numbers of its file; a flight may change some numbers.
 
     The controllers use the description, the plant uses the numbers. The entry `effects` of the
-    numbers are the effects of the plant, see `effects.presets`.
+    numbers are the effects of the plant, see `effects.presets`; `environment`: what stands around.
     """
 
     description: VehicleDescription
@@ -51,8 +53,9 @@ class Vehicle:
 
     @classmethod
     def of(cls, description: VehicleDescription) -> Vehicle:
-        """Return the vehicle as described, on a plant without effects."""
-        return cls(description, {"effects": {}} | description.numbers)
+        """Return the vehicle as described, on a plant without effects, in the usual environment."""
+        beside = {"effects": {}, ENVIRONMENT: default_environment()}
+        return cls(description, beside | description.numbers)
 
     def changed(self, changes: dict[str, object]) -> Vehicle:
         """Return a copy with dotted entries replaced, e.g. {"air.gust": 1.0}.
@@ -86,7 +89,7 @@ class Vehicle:
         for joint in described.joints:
             self._limit(spec, joint)
         self._add_actuators(spec)
-        spec.geom(PAYLOAD).mass = max(payload_mass, 1e-3)
+        add_surroundings(spec, self.numbers[ENVIRONMENT], payload_mass)
         if extend is not None:
             extend(spec)
         model = self._of_mujoco(spec.compile)
@@ -108,10 +111,10 @@ class Vehicle:
         described = self.description
         joints = {joint.name for joint in spec.joints}
         for kind, required, there in (
-            ("body", (BASE, PAYLOAD, MAGNET), {body.name for body in spec.bodies}),
-            ("joint", (BASE, PAYLOAD, SWING, *described.joint_names), joints),
+            ("body", (BASE, MAGNET), {body.name for body in spec.bodies}),
+            ("joint", (BASE, SWING, *described.joint_names), joints),
             ("site", ("imu", "magnet_face"), {site.name for site in spec.sites}),
-            ("geom", (PAYLOAD, "payload_plate", "magnet_face"), {g.name for g in spec.geoms}),
+            ("geom", ("magnet_face",), {g.name for g in spec.geoms}),
             ("sensor", ("specific_force", "body_rates"), {s.name for s in spec.sensors}),
         ):
             missing = [name for name in required if name not in there]

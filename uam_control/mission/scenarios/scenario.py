@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,8 @@ class Scenario:
     Times are mission times [s]. arm_start: joint angles at take-off [rad]; payload_mass [kg];
     drop_point: x, y [m]; phases, magnet, snapshots: (begin, value). route: without route_at it is
     the whole flight, see `route`; with it, its motion is added to that of the moves from then on.
-    notes: for the user, about the file.
+    notes: for the user, about the file. environment: what stands around in simulation, see
+    `environment`; (): the usual.
     """
 
     name: str
@@ -72,6 +74,12 @@ class Scenario:
     snapshots: tuple[tuple[float, str], ...] = field(default=())
     faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
     notes: tuple[str, ...] = ()
+    environment: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def surroundings(self) -> dict[str, Any]:
+        """Return the change of the plant's numbers that this scenario makes."""
+        return {"environment": list(self.environment)} if self.environment else {}
 
     def trajectory(self, start: np.ndarray) -> Trajectory:
         """Return the reference from `start` (chi at take-off) to the landing point."""

@@ -13,6 +13,7 @@ import numpy as np
 from uam_control.coordinates import BASE_COORDINATES, arm_coordinates
 from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios.csv_file import from_csv
+from uam_control.mission.scenarios.environment import ENVIRONMENT, read_environment
 from uam_control.mission.scenarios.reference_kinds import Middle, legs
 from uam_control.mission.scenarios.route import Route
 from uam_control.mission.scenarios.scenario import (
@@ -37,7 +38,7 @@ SHORTEST = 1e-3  # [s] of a move or of the landing
 
 KEYS = (
     *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "payload"),
-    *("landing", "snapshots", "faults"),
+    *("landing", "snapshots", "faults", ENVIRONMENT),
 )
 
 
@@ -104,6 +105,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
         ),
         snapshots=_timeline(top, "snapshots", "at", "caption", Section.text),
         faults=tuple(faults),
+        environment=read_environment(top),
     )
     if "trajectory" not in top.values:
         return scenario
@@ -119,7 +121,7 @@ def _along_route(
 ) -> Scenario:
     """Return the scenario that consists of a trajectory and the ways to it and from it."""
     for key in top.values:
-        if key not in ("description", "arm_start", "trajectory", "end"):
+        if key not in ("description", "arm_start", "trajectory", "end", ENVIRONMENT):
             raise top.error(key, "not together with a trajectory alone; give moves and landing")
     end = top.text("end", default=RETURN)
     if end not in (RETURN, LAND):
@@ -137,6 +139,7 @@ def _along_route(
         phases=(),
         landing=Landing(0.0, 0.0),
         route=route,
+        environment=read_environment(top),
     )
     return scenario.begun_at(start)
 

@@ -58,7 +58,7 @@ class DirectFlight:
         self.autopilot_imu = autopilot_imu
         self.say: Callable[[str], object] = lambda text: None
         sets = profile.sets
-        vehicle = vehicle.changed(servo_mode(profile))
+        vehicle = vehicle.changed(servo_mode(profile) | scenario.surroundings)
         started = (vehicle, payload_mass, seed, scenario.arm_start)
         self.plant = make_plant(*started, faults or Schedule(), plant)
         self._faults = DirectFaults(faults, self.plant) if faults else None

@@ -69,7 +69,11 @@ def parameters(
     sections = flight_nodes(settings, folder)
     sections[wiring.MISSION]["autopilot_has_clock"] = in_the_loop(settings)
     sections[wiring.PLANT] = {
-        "vehicle_changes": json.dumps(settings.vehicle_changes | servo_mode(settings.profile)),
+        "vehicle_changes": json.dumps(
+            settings.vehicle_changes
+            | servo_mode(settings.profile)
+            | settings.scenario.surroundings
+        ),
         "plant": settings.plant,
         "payload_mass": float(settings.payload_mass),
         "seed": settings.seed,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
-import mujoco
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull
 
 from uam_control.coordinates import arm_coordinates
 from uam_lab.records.results.timeseries import Series
@@ -23,7 +24,6 @@ TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
 FOOT = "foot_"  # beginning of the names of the landing gear's geoms
 JOINT_WEIGHT = 0.2  # [m/rad] of the joints' motion in the distance between two poses
 REACH = 0.35  # [m] shown around the path, for rotors and arm
-SCENERY = {"stand_post": "#b9a58f", "stand_top": "#8c7660", "drop_mat": "#e3c552"}
 
 
 def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
@@ -157,26 +157,17 @@ def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
 def _scenery(axis: Axes, poses: Poses) -> None:
     poses.put(0)
     axis.axhline(0.0, color="#a7afb7", linewidth=1.0, zorder=1)
-    for name, colour in SCENERY.items():
-        if len(poses.geoms(name)):
-            _boxed(axis, poses, name, colour, 1.0, 2)
+    for geom in poses.scenery():
+        _boxed(axis, poses, geom, poses.model.geom(geom).rgba[:3], 1.0, 2)
 
 
-def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, order: int) -> None:
-    """Draw a geom as its upright bounding rectangle; exact for an upright geom."""
-    size = poses.model.geom(geom).size
-    kind = poses.model.geom(geom).type[0]
-    half = (size[0], size[1]) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else (size[0], size[2])
-    centre = poses.data.geom(geom).xpos
-    corner = (centre[0] - half[0], centre[2] - half[1])
-    axis.add_patch(
-        Rectangle(
-            corner,
-            2 * half[0],
-            2 * half[1],
-            facecolor=colour,
-            edgecolor="none",
-            alpha=opacity,
-            zorder=order,
-        )
-    )
+def _boxed(
+    axis: Axes, poses: Poses, geom: str, colour: str | np.ndarray, opacity: float, order: int
+) -> None:
+    """Draw the outline of a geom's box, seen from the side."""
+    box, shape = poses.model.geom_aabb[poses.model.geom(geom).id], poses.data.geom(geom)
+    corners = box[:3] + box[3:] * np.array(list(product((-1.0, 1.0), repeat=3)))
+    seen = (shape.xpos + corners @ shape.xmat.reshape(3, 3).T)[:, [0, 2]]
+    outline = seen[ConvexHull(seen, qhull_options="QJ").vertices]
+    look = {"facecolor": colour, "edgecolor": "none", "alpha": opacity, "zorder": order}
+    axis.add_patch(Polygon(outline, **look))

@@ -9,7 +9,8 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_lab.records.results.timeseries import Series
-from uam_sim_bridge.plant.vehicle import BASE, PAYLOAD, SWING, Vehicle
+from uam_sim_bridge.plant.surroundings import PAYLOAD, PLACE
+from uam_sim_bridge.plant.vehicle import BASE, ENVIRONMENT, SWING, Vehicle
 
 OUT_OF_SIGHT = (50.0, 50.0, -1.0)
 
@@ -20,7 +21,9 @@ class Poses:
     def __init__(self, series: Series):
         mass = series.info.get("payload_mass_kg") or 0.0
         self.series = series
-        self.vehicle = Vehicle.load(series.info.get("vehicle") or DEFAULT_VEHICLE)
+        around = {key: series.info[key] for key in (ENVIRONMENT,) if series.info.get(key)}
+        vehicle = Vehicle.load(series.info.get("vehicle") or DEFAULT_VEHICLE)
+        self.vehicle = vehicle.changed(around)
         self.model = self.vehicle.compile(mass)
         self.data = mujoco.MjData(self.model)
         self.has_payload = mass > 0.0 and not np.isnan(series["payload.x"]).all()
@@ -60,6 +63,12 @@ class Poses:
         names = [self.model.geom(i).name for i in range(self.model.ngeom)]
         found = [i for i, name in enumerate(names) if name.startswith(beginning)]
         return self.data.geom_xpos[found].copy()
+
+    def scenery(self) -> list[str]:
+        """Return the names of the geoms that stand around the vehicle."""
+        model, place = self.model, self.model.body(PLACE).id
+        above = model.body_parentid[model.geom_bodyid]
+        return [model.geom(i).name for i in np.flatnonzero(above == place)]
 
     def body(self, name: str) -> np.ndarray:
         """Return the world position (3,) [m] of a body's frame."""

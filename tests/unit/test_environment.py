@@ -1,0 +1,132 @@
+"""The entry `environment` of a scenario: bodies of the plant, and what is refused by name."""
+
+from __future__ import annotations
+
+import mujoco
+import pytest
+import yaml
+
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.vehicle import load_description
+from uam_lab.flights import arm_on_ground
+from uam_sim_bridge.plant import Vehicle
+
+S500 = load_description()
+HOVER = {
+    "arm_start": {"alpha_1_deg": 0, "alpha_2_deg": 90},
+    "moves": [{"coordinate": "z", "from": 0, "until": 3, "to": 1.2}],
+    "landing": {"at": 5, "duration": 3},
+}
+EVERY_KIND = [
+    {"kind": "table", "position": [-1.2, 0.3], "yaw_deg": 20, "height": 0.6},
+    {"kind": "shelf", "position": [1.4, 0.0]},
+    {"kind": "wall", "position": [0.0, 2.0], "yaw_deg": 90},
+    {"kind": "slope", "position": [0.0, -1.5], "angle_deg": 15},
+    {"kind": "box", "position": [0.8, 1.0]},
+    {"kind": "stand", "position": [-0.3, 1.2], "height": 0.4},
+    {"kind": "mat", "position": [0.9, -0.9]},
+    {"kind": "payload", "rests_on": "table", "material": "steel", "size": [0.08, 0.05, 0.03]},
+    {"kind": "payload", "rests_on": "shelf", "board": 2, "mass": 0.1},
+]
+
+
+def scenario(folder, entries):
+    file = folder / "around.yaml"
+    file.write_text(yaml.safe_dump(HOVER | {"environment": entries}))
+    return load_scenario(str(file), S500)
+
+
+def compiled(folder, entries, mass=0.2):
+    around = scenario(folder, entries).surroundings
+    return Vehicle.of(S500).changed(around).compile(mass)
+
+
+def test_the_usual_environment_is_that_of_the_paper():
+    """Stand of 0.727 m at x = -0.789 m with the payload of 4 cm on it, mat of 2 cm at +0.789 m."""
+    model = Vehicle.of(S500).compile(0.2)
+    assert model.body("payload").pos.tolist() == [-0.789, 0.0, 0.747]
+    assert model.body("payload").mass == 0.2
+    top = model.geom("stand_top")
+    assert top.pos[2] + top.size[2] == pytest.approx(0.727, abs=1e-12)
+    assert model.body("stand").pos.tolist() == [-0.789, 0.0, 0.0]
+    assert model.body("drop_mat").pos.tolist() == [0.789, 0.0, 0.0]
+    assert model.geom("drop_mat").size.tolist() == [0.2, 0.2, 0.01]
+
+
+def test_every_kind_becomes_bodies_and_stays_where_it_stands(tmp_path):
+    """Payloads: 0.6 + 0.015 m on the table; second of three boards of 1.2 m: 0.8 + 0.02 m."""
+    model = compiled(tmp_path, EVERY_KIND)
+    data = mujoco.MjData(model)
+    for _ in range(250):
+        mujoco.mj_step(model, data)
+    assert data.body("payload").xpos == pytest.approx([-1.2, 0.3, 0.615], abs=1e-3)
+    assert data.body("payload_2").xpos == pytest.approx([1.4, 0.0, 0.82], abs=1e-3)
+    assert model.body("payload_2").mass == 0.1
+    assert model.geom("shelf_board_3").pos[2] == pytest.approx(1.19)  # its upper side is at 1.2
+
+
+def test_entries_replace_the_usual_ones(tmp_path):
+    model = compiled(tmp_path, [{"kind": "box", "position": [2.0, 0.0]}])
+    names = [model.body(i).name for i in range(model.nbody)]
+    assert "box" in names and "stand" not in names and "drop_mat" not in names
+    assert model.body("payload").pos[0] == 50.0  # out of sight: nobody asked for one
+    assert scenario(tmp_path, []).surroundings == {}
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ({"kind": "tree", "position": [1, 0]}, "environment[0].kind: 'tree' is not one of stand"),
+        ({"kind": "box"}, "environment[0].position: missing: [x, y] or [x, y, z] in m"),
+        ({"kind": "box", "position": [1, float("nan")]}, "position: nan is not finite"),
+        ({"kind": "box", "position": [1, 0, -0.1]}, "position: -0.1 m is below the ground"),
+        ({"kind": "box", "position": [999, 0]}, "position: [999.0, 0.0]: at most 50 m away"),
+        ({"kind": "box", "position": [1, 0], "size": [1, 0, 1]}, "size: [1.0, 0.0, 1.0]: lengths"),
+        ({"kind": "box", "position": [1, 0], "height": 1}, "environment[0].height: unknown"),
+        ({"kind": "box", "position": [1, 0], "material": "gold"}, "material: 'gold' is not one of"),
+        ({"kind": "slope", "position": [1, 0], "angle_deg": 80}, "angle_deg: 80; at most 60"),
+        ({"kind": "payload", "rests_on": "moon"}, "rests_on: 'moon' is not one of"),
+        ({"kind": "payload", "position": [1, 0], "mass": 3}, "mass: 3 kg; 0 to 2 kg"),
+    ],
+)
+def test_an_entry_is_refused_in_one_line(tmp_path, entry, said):
+    with pytest.raises(ScenarioError) as error:
+        scenario(tmp_path, [entry])
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("entries", "said"),
+    [
+        ([{"kind": "box", "position": [0.1, 0.1]}], "box and the vehicle intersect by 0.064 m"),
+        (
+            [{"kind": "box", "position": [1.8, 0]}, {"kind": "table", "position": [2.2, 0.3]}],
+            "box and table intersect by",
+        ),
+        (
+            [{"kind": "box", "position": [2, 0]}, {"kind": "box", "position": [3, 0], "name": "box"}],
+            "environment[1].name: 'box' is the name of another entry",
+        ),
+        (
+            [{"kind": "stand", "position": [2, 0]}, {"kind": "payload", "rests_on": "stand", "board": 1, "position": [2.2, 0]}],
+            "position: [2.2, 0.0] is beside stand",
+        ),
+        (
+            [{"kind": "shelf", "position": [2, 0]}, {"kind": "payload", "rests_on": "shelf", "board": 4}],
+            "board: 4; shelf has 3",
+        ),
+        (
+            [{"kind": "wall", "position": [2, 0]}, {"kind": "payload", "rests_on": "wall"}],
+            "rests_on: nothing stands on a wall",
+        ),
+    ],
+)  # fmt: skip
+def test_entries_that_do_not_fit_together_are_refused_by_name(tmp_path, entries, said):
+    with pytest.raises(ScenarioError) as error:
+        arm_on_ground.check(S500, scenario(tmp_path, entries))
+    assert said in str(error.value)
+
+
+def test_what_touches_does_not_intersect(tmp_path):
+    arm_on_ground.check(S500, scenario(tmp_path, EVERY_KIND))
