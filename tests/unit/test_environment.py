@@ -29,6 +29,8 @@ EVERY_KIND = [
     {"kind": "payload", "rests_on": "shelf", "board": 2, "mass": 0.1},
 ]
 
+BOX, STAND, SHELF = ({"kind": kind, "position": [2, 0]} for kind in ("box", "stand", "shelf"))
+
 
 def scenario(folder, entries):
     file = folder / "around.yaml"
@@ -105,15 +107,15 @@ def test_an_entry_is_refused_in_one_line(tmp_path, entry, said):
             "box and table intersect by",
         ),
         (
-            [{"kind": "box", "position": [2, 0]}, {"kind": "box", "position": [3, 0], "name": "box"}],
+            [BOX, {"kind": "box", "position": [3, 0], "name": "box"}],
             "environment[1].name: 'box' is the name of another entry",
         ),
         (
-            [{"kind": "stand", "position": [2, 0]}, {"kind": "payload", "rests_on": "stand", "board": 1, "position": [2.2, 0]}],
+            [STAND, {"kind": "payload", "rests_on": "stand", "position": [2.2, 0]}],
             "position: [2.2, 0.0] is beside stand",
         ),
         (
-            [{"kind": "shelf", "position": [2, 0]}, {"kind": "payload", "rests_on": "shelf", "board": 4}],
+            [SHELF, {"kind": "payload", "rests_on": "shelf", "board": 4}],
             "board: 4; shelf has 3",
         ),
         (
@@ -121,7 +123,7 @@ def test_an_entry_is_refused_in_one_line(tmp_path, entry, said):
             "rests_on: nothing stands on a wall",
         ),
     ],
-)  # fmt: skip
+)
 def test_entries_that_do_not_fit_together_are_refused_by_name(tmp_path, entries, said):
     with pytest.raises(ScenarioError) as error:
         arm_on_ground.check(S500, scenario(tmp_path, entries))

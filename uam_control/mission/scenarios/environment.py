@@ -1,6 +1,7 @@
-"""The entry `environment` of a scenario: what stands around the vehicle; see config/environment.yaml.
+"""The entry `environment` of a scenario: what stands around the vehicle.
 
-The plant makes bodies of it; a real vehicle flies among real ones.
+Kinds: config/environment.yaml. The plant makes bodies of the entries; a real vehicle flies among
+real ones.
 """
 
 from __future__ import annotations
@@ -116,7 +117,9 @@ def _place(entry: Section, made: dict[str, Any], before: Sequence[dict[str, Any]
         raise entry.error("position", "missing: [x, y] or [x, y, z] in m")
     if on is not None:
         if len(place) == 3:
-            raise entry.error("position", "[x, y] beside rests_on: the height is that of its upper side")
+            raise entry.error(
+                "position", "[x, y] beside rests_on: the height is that of its upper side"
+            )
         return [*place, _top(entry, on, place, made["board"])]
     if len(place) == 3 and place[2] < 0.0:
         raise entry.error("position", f"{place[2]:g} m is below the ground")

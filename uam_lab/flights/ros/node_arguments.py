@@ -70,9 +70,7 @@ def parameters(
     sections[wiring.MISSION]["autopilot_has_clock"] = in_the_loop(settings)
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(
-            settings.vehicle_changes
-            | servo_mode(settings.profile)
-            | settings.scenario.surroundings
+            settings.vehicle_changes | servo_mode(settings.profile) | settings.scenario.surroundings
         ),
         "plant": settings.plant,
         "payload_mass": float(settings.payload_mass),
