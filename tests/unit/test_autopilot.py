@@ -4,18 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from quadrotor import MASS, Quadrotor
+from quadrotor import INERTIA, MASS, Quadrotor
 
 from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_multiply
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import FORCE, MavCmd, MavResult, Mode
 from uam_control.setpoints.attitude_target import AttitudeTarget
-from uam_control.setpoints.rate_thrust_map import RateThrustMap
+from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, wrench_target
 
 OFFBOARD = (1.0, 6.0, 0.0)
 HOVER = MASS * 9.81 / (4 * 10.34)
@@ -372,3 +374,20 @@ def test_a_vehicle_without_vision_comes_down_once_and_is_disarmed(bias, seconds,
     assert not bench.autopilot.status.armed and "Disarmed by landing" in bench.texts()
     down = next(i for i, height in enumerate(heights) if height <= 0.0)
     assert max(heights[down:]) < 0.01 and max(heights) < heights[0] + 0.5
+
+
+def test_a_wrench_drives_the_motors_without_a_rate_loop():
+    """A torque of 0.1 accelerates the roll until another setpoint comes; rates stop it again."""
+    bench = airborne()
+    scale = RateThrustParameters.of(load_description()).torque_scale(load_description())
+    target = WrenchTarget(np.array([0.02, 0.0, 0.0]), HOVER)
+    rolls = []
+    for _ in range(25):
+        message = setpoint_message(target, bench.time, 1)
+        assert not bench.autopilot.target(bench.time, wrench_target(message))
+        bench.tick()
+        rolls.append(bench.body.gyro[0])
+    expected = 0.02 * scale[0] / INERTIA[0]
+    assert np.diff(rolls[12:]).mean() / 0.004 == pytest.approx(expected, rel=0.1)
+    bench.run(0.5, ((0, 0, 0), HOVER))
+    assert abs(bench.body.gyro[0]) < 0.2

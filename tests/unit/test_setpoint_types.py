@@ -7,6 +7,7 @@ import numpy as np
 from uam_control.setpoints.kinds.attitude import attitude_setpoint
 from uam_control.setpoints.kinds.desired import Desired, level
 from uam_control.setpoints.kinds.rates import rates_setpoint
+from uam_control.setpoints.kinds.wrench import wrench_setpoint
 
 HALF = math.sqrt(0.5)
 # turned left by a quarter turn: nose to the north
@@ -27,6 +28,16 @@ def test_an_attitude_is_sent_from_frd_to_ned_without_rates():
     np.testing.assert_allclose(target.quaternion, [1.0, 0.0, 0.0, 0.0], atol=1e-15)
     east = attitude_setpoint(Desired(np.zeros(3), level(0.0), 0.5))
     np.testing.assert_allclose(east.quaternion, [HALF, 0.0, 0.0, HALF])
+
+
+def test_a_wrench_is_sent_in_frd_within_its_range_and_without_torque_body_rates_are():
+    desired = Desired(np.array([0.1, 0.2, 0.3]), NORTH, 0.6, None, np.array([0.1, 0.2, -3.0]))
+    target = wrench_setpoint(desired)
+    assert target.thrust == 0.6 and not target.refused()
+    np.testing.assert_array_equal(target.torque, [0.1, -0.2, 1.0])
+    assert np.isnan(target.body_rates).all()
+    assert wrench_setpoint(Desired(np.zeros(3), NORTH, 0.6)).type_mask == 128
+    assert target._replace(thrust=math.nan).refused() == "not finite"
 
 
 def test_level_is_a_yaw_at_rest():

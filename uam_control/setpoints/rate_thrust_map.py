@@ -243,6 +243,7 @@ class RateThrustMap:
         self.flat[:] = p = checked.flat(self._vehicle)
         self.curve = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())
         self.parameters = checked
+        self._torque_scale = checked.torque_scale(self._vehicle)
         self.memory["battery"] = checked.battery_factor
         self.thrust_factor = self._factor
 
@@ -280,6 +281,12 @@ class RateThrustMap:
         """Return `map` of the attitude and body rates in state (3, 6 + n), see `coordinates`."""
         thrust = self._map_state(tau_p, tau_q, state, self.flat, self.rates)
         return self.rates, _accepted(thrust)
+
+    def normalised(self, tau_q: np.ndarray, thrust: float) -> np.ndarray:
+        """Return tau_q (3,) [N m, FLU] in parts of the largest torque, at the normalised thrust."""
+        p = self.flat
+        slope = thrust_slope(thrust, *self.curve) / p[_FULL]
+        return tau_q / (self._torque_scale * slope)
 
     def scaled(self, command: float, factor: float) -> float:
         """Return the normalised thrust that makes `factor` times the thrust of `command`."""

@@ -145,7 +145,8 @@ class SetpointSource:
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:
-                desired = Desired(rates, attitude, thrust, reference)
+                torque = self.map.normalised(tau_q, thrust)
+                desired = Desired(rates, attitude, thrust, reference, torque)
                 setpoint = self.type(desired)
                 refused = setpoint.refused()
                 if not refused:

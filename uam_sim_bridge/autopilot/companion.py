@@ -16,7 +16,12 @@ from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
-from uam_sim_bridge.mavlink.protocol.setpoint_messages import attitude_target, position_target
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import (
+    GROUP,
+    attitude_target,
+    position_target,
+    wrench_target,
+)
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
 _PARAMETERS_PER_TICK = 10
@@ -38,6 +43,7 @@ class Companion:
         self._handlers = {
             "SET_ATTITUDE_TARGET": self._attitude_target,
             "SET_POSITION_TARGET_LOCAL_NED": self._position_target,
+            "SET_ACTUATOR_CONTROL_TARGET": self._wrench_target,
             "VISION_POSITION_ESTIMATE": self._vision_position,
             "ODOMETRY": self._odometry,
             "COMMAND_LONG": self._command_long,
@@ -84,6 +90,13 @@ class Companion:
         refused = f"frame {m.coordinate_frame}, local NED expected"
         if m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED:
             refused = self._autopilot.target(time, position_target(m))
+        if refused:
+            self._say_once(f"setpoint refused: {refused}")
+
+    def _wrench_target(self, time: float, m: Message) -> None:
+        refused = f"group {m.group_mlx}, {GROUP} expected"
+        if m.group_mlx == GROUP:
+            refused = self._autopilot.target(time, wrench_target(m))
         if refused:
             self._say_once(f"setpoint refused: {refused}")
 

@@ -25,11 +25,12 @@ from uam_control.offboard.modes import (
 from uam_control.setpoints.attitude_target import (
     ATTITUDE_AND_YAW_RATE,
     RATES,
-    AttitudeTarget,
 )
+from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.position_target import PositionTarget
 from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.setpoints.thrust_curve import inverse_curve
+from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import (
@@ -100,7 +101,7 @@ def control_tick(
 
     gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust.
     """
-    model_factor, filters, gains, mixer, inverse, memory, motors = loop
+    filters, gains, memory, motors = loop.filters, loop.gains, loop.memory, loop.motors
     filter_gyro(gyro, dt, filters, memory)
     if not armed:
         for axis in range(3):
@@ -111,11 +112,17 @@ def control_tick(
             motors[i] = 0.0
         return
     rate_torque(setpoint, dt, filters, gains, landed, memory)
-    torque = memory[TORQUE]
-    allocate(torque, setpoint[3], mixer, motors)
-    unallocated_torque(torque, motors, inverse, memory[UNALLOCATED])
-    for i in range(len(motors)):
-        motors[i] = inverse_curve(model_factor, motors[i])
+    drive_motors(setpoint[3], loop)
+
+
+@jit
+def drive_motors(thrust: float, loop: RateLoop) -> None:
+    """Write the motors for the torque in the loop's memory and a normalised thrust."""
+    torque = loop.memory[TORQUE]
+    allocate(torque, thrust, loop.mixer, loop.motors)
+    unallocated_torque(torque, loop.motors, loop.inverse, loop.memory[UNALLOCATED])
+    for i in range(len(loop.motors)):
+        loop.motors[i] = inverse_curve(loop.model_factor, loop.motors[i])
 
 
 @jit
@@ -204,6 +211,7 @@ class Autopilot:
         self._setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
         self._position: PositionTarget | None = None  # flown in place of body rates or attitude
         self._position_control = PositionControl(self.parameters)
+        self._torque: np.ndarray | None = None  # normalised, FRD, flown without the rate loop
         self._desired: np.ndarray | None = None  # attitude FRD → NED, None: body rates are flown
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
@@ -242,8 +250,8 @@ class Autopilot:
         self._sample_rate = sample_rate
         self._configure()
 
-    def target(self, time: float, target: AttitudeTarget | PositionTarget) -> str:
-        """Set the setpoint of body rates, attitude or position; return why it is refused, else "".
+    def target(self, time: float, target: Target) -> str:
+        """Set the setpoint; return why it is refused, else "".
 
         A setpoint that is not finite is refused; the thrust is clamped to 0..1.
         """
@@ -251,14 +259,18 @@ class Autopilot:
         if refused:
             return refused
         if isinstance(target, PositionTarget):
-            self._position = target
+            self._position, self._torque = target, None
             self.commander.setpoint(time)
             return ""
-        self._position = None
-        setpoint, rates = self._setpoint, target.rates
-        setpoint[:3] = rates
+        self._position = self._desired = self._torque = None
+        setpoint = self._setpoint
         setpoint[3] = min(1.0, max(0.0, target.thrust))
-        self._desired = None
+        if isinstance(target, WrenchTarget):
+            self._torque = np.clip(target.torque, -1.0, 1.0)
+            self.commander.setpoint(time)
+            return ""
+        rates = target.rates
+        setpoint[:3] = rates
         if target.type_mask != RATES:
             self._desired = target.quaternion / np.linalg.norm(target.quaternion)
             self._yaw_rate = rates[2] if target.type_mask == ATTITUDE_AND_YAW_RATE else 0.0
@@ -363,6 +375,9 @@ class Autopilot:
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
+        if self._flew_rates and commander.armed and self._torque is not None:
+            self._memory[TORQUE], self._memory[INTEGRAL] = self._torque, 0.0
+            drive_motors(setpoint[3], self._loop)
         if commander.stopped:
             self.motors[:] = 0.0
         velocity = self._velocity
@@ -387,7 +402,8 @@ class Autopilot:
     @property
     def settled(self) -> bool:
         """Whether nothing is to be decided but by thrust and stream, see `fly_rates`."""
-        rates = self._flew_rates and self._position is None and self._desired is None
+        others = self._position, self._desired, self._torque
+        rates = self._flew_rates and all(other is None for other in others)
         battery = self.battery.charge is not None or self.parameters["SIM_BAT_ENABLE"]
         return rates and not battery and self.commander.flies_offboard and self.landing.flies
 

@@ -1,1 +1,1 @@
-"""Kinds of setpoints: body rates, attitude, position."""
+"""Kinds of setpoints: body rates, attitude, position, wrench."""

@@ -8,12 +8,14 @@ from uam_control.setpoints.kinds.attitude import attitude_setpoint
 from uam_control.setpoints.kinds.desired import SetpointType
 from uam_control.setpoints.kinds.position import position_setpoint
 from uam_control.setpoints.kinds.rates import rates_setpoint
+from uam_control.setpoints.kinds.wrench import wrench_setpoint
 from uam_control.settings.parameter_set import ParameterSet, choice, number
 
 SETPOINTS: dict[str, SetpointType] = {
     "rates": rates_setpoint,
     "attitude": attitude_setpoint,
     "position": position_setpoint,
+    "wrench": wrench_setpoint,
 }
 
 
@@ -23,7 +25,8 @@ class SetpointParameters(ParameterSet):
 
     setpoint: str = choice(
         "rates",
-        "what is sent: rates or attitude with the thrust, or position; only rates act as tau_q",
+        "what is sent: rates, attitude or wrench (torque) with the thrust, or position; only rates "
+        "and wrench act as tau_q",
         tuple(SETPOINTS),
     )
 

@@ -249,8 +249,8 @@ class OffboardLink(FlightState):
         self._request(Request.KILL)
 
     def send_setpoint(self, target: Target, time: float) -> None:
-        """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET, or
-        SET_POSITION_TARGET_LOCAL_NED.
+        """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET,
+        SET_POSITION_TARGET_LOCAL_NED or SET_ACTUATOR_CONTROL_TARGET.
 
         Raises ValueError if a value is not finite or thrust is out of range.
         """

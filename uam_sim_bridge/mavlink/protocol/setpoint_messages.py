@@ -7,6 +7,7 @@ import numpy as np
 from uam_control.frames import swap_euler, swap_world
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.position_target import (
     ACCELERATION_IGNORED,
     VELOCITY_IGNORED,
@@ -14,13 +15,15 @@ from uam_control.setpoints.position_target import (
     PositionTarget,
 )
 from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
+GROUP = 0  # of SET_ACTUATOR_CONTROL_TARGET: flight controls
 # indices of the diagonal in the upper triangle of the 6x6 covariance, stored row by row
 _DIAGONAL = (0, 6, 11, 15, 18, 20)
 
 
-def setpoint_message(target: AttitudeTarget | PositionTarget, time: float, system: int) -> Message:
+def setpoint_message(target: Target, time: float, system: int) -> Message:
     """Return the setpoint as a message to the autopilot of the system id `system`; time [s]."""
     milliseconds = round(time * 1e3) & 0xFFFFFFFF
     if isinstance(target, AttitudeTarget):
@@ -32,6 +35,11 @@ def setpoint_message(target: AttitudeTarget | PositionTarget, time: float, syste
             target.quaternion.tolist(),
             *target.rates.tolist(),
             target.thrust,
+        )
+    if isinstance(target, WrenchTarget):
+        controls = [*target.torque.tolist(), target.thrust, *(0.0,) * 4]
+        return mavlink2.MAVLink_set_actuator_control_target_message(
+            milliseconds * 1000, GROUP, system, mavlink2.MAV_COMP_ID_AUTOPILOT1, controls
         )
     return mavlink2.MAVLink_set_position_target_local_ned_message(
         milliseconds,
@@ -51,6 +59,11 @@ def attitude_target(m: Message) -> AttitudeTarget:
     """Return the content of a SET_ATTITUDE_TARGET."""
     rates = np.array([m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate])
     return AttitudeTarget(m.type_mask, np.array(m.q, dtype=float), rates, m.thrust)
+
+
+def wrench_target(m: Message) -> WrenchTarget:
+    """Return the content of a SET_ACTUATOR_CONTROL_TARGET of GROUP."""
+    return WrenchTarget(np.array(m.controls[:3], dtype=float), m.controls[3])
 
 
 def position_target(m: Message) -> PositionTarget:
