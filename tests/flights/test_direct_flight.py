@@ -126,9 +126,10 @@ def test_the_bridge_uses_its_section_of_the_profile():
     assert flight.sequence.parameters.stream_time == 2.0
 
 
-def test_attitude_setpoints_complete_the_mission():
-    """The autopilot's attitude loop flies in place of tau_q; the controllers are the same."""
-    a_flight = flight(profile=("s500", "attitude_setpoints"))
+@pytest.mark.parametrize("profile", ["attitude_setpoints", "wrench_setpoints"])
+def test_other_setpoints_complete_the_mission(profile):
+    """The autopilot's attitude loop flies in place of tau_q, or none of its loops."""
+    a_flight = flight(profile=("s500", profile))
     a_flight.run()
     result = metrics(a_flight)
     assert result["mission_completed"], result["shortfalls"]
