@@ -2,7 +2,6 @@
 
 import math
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,13 +13,17 @@ from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.acting_effects import generator
-from uam_sim_bridge.plant.effects.arm_occlusion import distance, seen_markers
+from uam_sim_bridge.plant.effects.arm_occlusion import distance, hide, seen_markers, shift_pose
+from uam_sim_bridge.plant.effects.battery_sag import discharge
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.downwash import momentum
+from uam_sim_bridge.plant.effects.effect import Acting, Effect, size
 from uam_sim_bridge.plant.effects.ground_effect import raise_thrust, thrust_ratio
-from uam_sim_bridge.plant.effects.joint_gear import Gear, gear_step
+from uam_sim_bridge.plant.effects.joint_gear import Gear, gear_step, rigid_step
+from uam_sim_bridge.plant.effects.mocap_dropouts import drop
+from uam_sim_bridge.plant.effects.mocap_jitter import jitter
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
-from uam_sim_bridge.plant.effects.propeller_vibration import Shaken, mean_of_wave, vibrated
+from uam_sim_bridge.plant.effects.propeller_vibration import Shaken, mean_of_wave, vibrate
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -42,6 +45,12 @@ def flown(one, ticks=60, command=0.6):
         states.append(one.truth().state)
         one.step(np.full(rotors, command), np.full(one.joints, 0.3 * math.sin(tick)), False)
     return samples, np.array(states)
+
+
+def tick(one, name):
+    """Let one effect act before a control period."""
+    acting = one.effects.acting[name]
+    acting.STEPS["tick"](acting.arrays)
 
 
 def column(samples, kind):
@@ -165,12 +174,13 @@ def test_the_mean_of_a_wave_over_whole_turns_is_zero_and_over_none_its_value():
 
 def test_an_unbalanced_rotor_shakes_the_imu_by_hand():
     # 500 rad/s for 4 ms: 2 rad; mean of cos: sin(2)/2 = 0.45465, of sin: (1 - cos 2)/2 = 0.70807
-    zero, phases = np.zeros(3), np.zeros(1)
+    sample, phases = np.zeros(6), np.zeros(1)
     shaken = Shaken(
-        np.ones(1), np.array([[0.0, 0.0, 0.05]]), phases,
+        sample, np.array([500.0]), np.ones(1), np.array([[0.0, 0.0, 0.05]]), phases,
         np.array([1e-6]), 0.0, 1.0 / 2.0, np.full(3, 1.0 / 0.02), 0.004,
     )  # fmt: skip
-    gyro, force = vibrated(zero, zero, np.array([500.0]), shaken)
+    vibrate(shaken)
+    gyro, force = sample[:3], sample[3:]
     push = 1e-6 * 500.0**2  # 0.25 N
     assert force == pytest.approx([0.45465 * push / 2, 0.70807 * push / 2, 0.0], abs=1e-6)
     # torque 0.05 m x F about y from the x force, about -x from the y force; integrated: / omega
@@ -202,20 +212,20 @@ def test_rotors_differ_but_not_wildly_and_lags_with_them():
 
 def test_the_battery_sags_by_charge_and_current_by_hand():
     one = plant("battery_sag:start=1", payload=0.0)
-    battery = one._effects._ticks[0]
+    battery = one.effects.acting["battery_sag"].arrays
     one.rotors.thrust[:] = 5.4
     # ideal power 5.4^1.5 / sqrt(2 1.2 pi 0.127^2) = 35.98 W per rotor; 4 / 0.6 of it and 20 W
     power = 4 * 35.98 / 0.6 + 20.0
-    battery.tick()
+    discharge(battery)
     assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2)  # full, no current yet
     gain = 1.0 - math.exp(-0.004 / 0.1)
-    assert battery._current == pytest.approx(gain * power / 16.2, rel=1e-3)
-    battery._current = 16.0
-    battery.tick()
+    assert battery.numbers["current"] == pytest.approx(gain * power / 16.2, rel=1e-3)
+    battery.numbers["current"] = 16.0
+    discharge(battery)
     sag = (16.2 - 4 * 0.005 * 16.0) / 16.2  # 0.98025
     assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2 * sag**2, rel=1e-5)
-    battery._charge = 0.0
-    battery.tick()
+    battery.numbers["charge"] = 0.0
+    discharge(battery)
     assert one.rotors.constants[1] < 8.549e-6 * 1100.0**2 * (3.6 / 4.05) ** 2
 
 
@@ -254,9 +264,9 @@ def test_a_jet_begins_with_momentum_theory_and_keeps_its_momentum():
 def test_the_downwash_pushes_the_payload_down():
     one = plant("downwash:turbulence=0")
     payload = one.model.body("payload").id
-    one._effects.bench.rotors.thrust[:] = 5.4
+    one.rotors.thrust[:] = 5.4
     one.data.xpos[payload] = one.data.xpos[one.model.body("base").id] + [0.17, 0.17, -0.3]
-    one._effects.tick()
+    tick(one, "downwash")
     force = one.data.xfrc_applied[payload]
     # below rotor 3: b = 0.1057 + 0.1 0.35 = 0.1407 m, u^2 = 100.5; half 1.2 1.05 0.0036 of it
     assert force[2] == pytest.approx(-0.5 * 1.2 * 1.05 * 0.0036 * 100.5, rel=0.02)
@@ -266,11 +276,12 @@ def test_the_downwash_pushes_the_payload_down():
 # Joints
 
 
-def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0):
+def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0, load=0.0):
     """One step of a gear of 0.02 rad half play, 100 N m/rad; return contact, angle, speed."""
-    constants = np.array([0.02, 100.0, 0.0, 1.5, 0.05, 0.002])
+    constants = np.array([0.02, 100.0, 0.0, 1.5, 0.05, 0.0, 0.002])
     angles, speeds, output = np.array([angle]), np.array([speed]), np.zeros(1)
-    motors = Gear(np.array([0.01]), np.array([friction]), constants, angles, speeds)
+    friction = np.array([friction]), np.array([load])
+    motors = Gear(np.array([0.01]), *friction, constants, angles, speeds)
     gear_step(motors, np.array([torque]), np.array([alpha]), np.array([alpha_dot]), output)
     return output[0], angles[0], speeds[0]
 
@@ -288,21 +299,121 @@ def test_stiction_holds_a_resting_motor_and_coulomb_brakes_a_moving_one():
     assert gear(0.0, 0.0, 0.0, speed=1.0)[2] == pytest.approx(1.0 - 0.1 * 0.002 / 0.01)
 
 
+def test_friction_grows_with_the_torque_of_the_servo():
+    # at 1 rad/s: 0.1 + 0.3 2.0 = 0.7 N m brakes, 2.0 N m drives
+    turned = gear(2.0, 0.0, 0.0, speed=1.0, load=0.3)[2]
+    assert turned == pytest.approx(1.0 + (2.0 - 0.7) * 0.002 / 0.01)
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque"),
+    [
+        (1.0, 2.0 - 0.7),  # tanh(1 / 0.015) = 1: all of 0.1 + 0.3 2.0
+        (0.0, 2.0),  # at rest no friction: smooth
+        (0.015, 2.0 - 0.01 * 0.015 / 0.002),  # tanh(1) 0.7 would turn it back: its momentum only
+        (-1.0, 2.0 + 0.7),
+    ],
+)
+def test_a_rigid_gear_has_smooth_friction_that_never_turns_the_joint_back(speed, torque):
+    constants = np.array([0.0, 0.0, 0.0, 1.0, 0.05, 0.015, 0.002])
+    own = np.array([0.01]), np.array([0.1]), np.array([0.3])
+    torques = np.array([2.0])
+    rigid_step(Gear(*own, constants, np.zeros(1), np.zeros(1)), torques, np.array([speed]))
+    assert torques[0] == pytest.approx(torque)
+
+
 def test_a_joint_with_play_swings_freely_within_it():
     one = plant("joint_gear:backlash_deg=2")
     for _ in range(250):
         one.sense()
         one.step(np.zeros(4), np.array([0.0, 0.0]), False)
-    gear_ = one._effects.gears[0]
-    assert np.all(np.abs(gear_.motors.angle - one._alpha) <= math.radians(1.0) + 0.01)
+    motors = one.effects.acting["joint_gear"].motors
+    gap = np.abs(motors.angle - one.truth().state[0, 6:])
+    assert np.all(gap <= math.radians(1.0) + 0.01)
 
 
 def test_cables_pull_to_their_rest_angle():
     one = plant("cable_torque:stiffness=0.02,stiffness_spread=0,rest_spread_deg=0")
-    one._alpha[:] = [0.5, math.radians(90.0) - 0.25]
-    one._effects.tick()
-    dofs = one._effects.bench.arm_dofs
-    assert one.data.qfrc_applied[dofs] == pytest.approx([-0.01, 0.005])
+    bench = one.effects.bench
+    bench.angles[:] = [0.5, math.radians(90.0) - 0.25]
+    tick(one, "cable_torque")
+    assert one.data.qfrc_applied[bench.arm_dofs] == pytest.approx([-0.01, 0.005])
+
+
+def test_the_current_loop_s_noise_has_its_size_and_bandwidth_at_every_joint():
+    one = plant("servo_noise:torque=0.02/0.01,bandwidth=5")
+    noise, states = one.effects.acting["servo_noise"], []
+    for _ in range(20000):
+        one.effects.draw()
+        tick(one, "servo_noise")
+        states.append(noise.arrays.noise.copy())
+    states = np.array(states)
+    assert states.std(axis=0) == pytest.approx([0.02, 0.01], rel=0.1)
+    kept = [np.corrcoef(column[1:], column[:-1])[0, 1] for column in states.T]
+    assert kept == pytest.approx([math.exp(-2.0 * math.pi * 5.0 * 0.004)] * 2, abs=0.01)
+
+
+def test_a_number_for_each_joint_must_fit_the_vehicle():
+    with pytest.raises(
+        PlantError, match="3 numbers; allowed: one, or one for each of the 2 joints"
+    ):
+        plant("servo_noise:torque=0.1/0.1/0.1")
+
+
+def test_speeds_are_reported_late_and_angles_at_once():
+    late, calm = plant("joint_readings:delay=0.04"), plant()
+    (found, _), (usual, _) = flown(late), flown(calm)
+    for k in range(10, 60):
+        assert np.array_equal(found[k].joints[2], usual[k - 10].joints[2] if k > 10 else [0, 0])
+        assert np.array_equal(found[k].joints[1], usual[k].joints[1])
+
+
+# Rotors, masses and loads that are not the vehicle file's
+
+
+def test_rotors_differ_from_the_file_by_the_factors():
+    one = plant("rotor_mismatch:thrust=1/1/0.9/1,yaw=0.5,lag_up=2,lag_down=1,idle=0.1")
+    assert one.rotors.efficiency == pytest.approx([1.0, 1.0, 0.9, 1.0])
+    assert one.rotors.gains[:, 0] == pytest.approx(1.0 - np.exp(-0.002 / np.array([0.025, 0.025])))
+    assert abs(one.model.actuator("rotor_1").gear[5]) == pytest.approx(0.5 * 0.016)
+    for command, share in ((0.0, 0.1), (0.5, 0.55), (1.0, 1.0)):  # of the full speed: a line
+        for _ in range(400):
+            one.rotors.step(np.full(4, command), np.zeros(4))
+        assert one.rotors.speed[0] == pytest.approx(share * 1100.0)
+
+
+def test_the_thrust_fades_from_lift_off_on():
+    one = plant("thrust_fade:per_minute=0.06", payload=0.0)
+    part = one.effects.acting["thrust_fade"].arrays.part
+    for thrust, left in ((5.0, 1.0), (5.5, 0.999), (5.0, 0.998)):  # weight: 21.6 N
+        one.rotors.thrust[:] = thrust
+        for _ in range(250):
+            one.effects.bench.lift[:] = 1.0
+            tick(one, "thrust_fade")
+        assert part[0] == pytest.approx(left)
+    assert one.effects.bench.lift == pytest.approx(np.full(4, 0.998))
+
+
+@pytest.mark.parametrize("turning", [0.0, 1.0])
+def test_a_standing_load_acts_in_the_world_or_in_the_body(turning):
+    one = plant(f"standing_load:force=1/2/0,torque=0/0/0.1,turning={turning}")
+    bench, base = one.effects.bench, one.model.body("base").id
+    bench.base_axes[:] = [0, -1, 0, 1, 0, 0, 0, 0, 1]  # turned by 90 deg to the left
+    one.data.xfrc_applied[base] = [0.5, 0.0, 0.0, 9.0, 9.0, 9.0]  # drag, and the torque of before
+    tick(one, "standing_load")
+    force = [-2.0 + 0.5, 1.0, 0.0] if turning else [1.0 + 0.5, 2.0, 0.0]
+    assert one.data.xfrc_applied[base] == pytest.approx([*force, 0.0, 0.0, 0.1])
+
+
+def test_masses_inertias_and_the_centre_of_mass_differ_from_the_file():
+    one, calm = plant("mass_mismatch:base=1.1,inertia=1.2,arm=0.9,shift=0.01/0/0.02"), plant()
+    base, link = (one.model.body(name).id for name in ("base", "link_2"))
+    ratio = one.model.body_mass / np.maximum(calm.model.body_mass, 1e-12)
+    assert ratio[[base, link]] == pytest.approx([1.1, 0.9])
+    assert one.model.body_inertia[base] == pytest.approx(1.2 * calm.model.body_inertia[base])
+    assert one.model.body_inertia[link] == pytest.approx(0.9 * calm.model.body_inertia[link])
+    assert one.model.body_ipos[base] - calm.model.body_ipos[base] == pytest.approx([0.01, 0, 0.02])
+    assert ratio[one.model.body("payload").id] == 1.0
 
 
 # Mocap
@@ -332,38 +443,119 @@ def test_a_link_in_the_line_of_sight_hides_a_marker():
 
 
 def test_hidden_markers_shift_the_pose_by_their_errors():
+    # two markers on the x axis are seen; errors: both 1 mm up, the outer one 2 mm to the left
+    markers = np.array([[0.1, 0, 0], [-0.1, 0, 0], [0, 0.3, 0]])
+    errors = np.array([[0, 0.002, 0.001], [0, 0, 0.001], [9, 9, 9]])
+    pose = np.array([0.0, 1, 2, 3, 1, 0, 0, 0])
+    shift_pose(pose, LEVEL, markers, errors, np.array([True, True, False]))
+    assert pose[1:4] == pytest.approx([1.0, 2.001, 3.001])
+    assert pose[4:] == pytest.approx([1.0, 0, 0, 0.01 / 2], abs=2e-5)  # 2 mm over 0.2 m about z
+
+
+def test_a_thick_arm_hides_the_vehicle():
     one = plant("arm_occlusion")
-    occlusion = one._effects._poses[0]
-    pose = (0.0, np.zeros(3), np.array([1.0, 0, 0, 0]))
-    assert occlusion.pose(pose) is pose  # the arm hangs below all lines of sight
-    mujoco.mj_forward(one.model, one.data)
-    occlusion._thickness = 0.4  # a thick arm hides some
-    moved = occlusion.pose(pose)
-    assert moved is None or np.linalg.norm(moved[1]) < 5 * 0.0005
-    occlusion._thickness = 5.0
-    assert occlusion.pose(pose) is None
+    arrays, bench = one.effects.acting["arm_occlusion"].arrays, one.effects.bench
+    for thickness in (0.0, 5.0):
+        bench.pose[:], bench.lost = 0.5, False
+        hide(arrays._replace(thickness=thickness))
+        assert bench.lost == (thickness == 5.0) and np.all(bench.pose == 0.5)
 
 
 def test_stamps_jitter_but_never_go_back_and_the_position_wanders():
     one = plant("mocap_jitter:stamp=0.01,wander=0.001,wander_time=0.01")
-    jitter = one._effects._poses[0]
-    poses = [jitter.pose((k / 120.0, np.zeros(3), np.ones(4))) for k in range(2000)]
-    stamps = np.array([p[0] for p in poses])
-    assert np.all(np.diff(stamps) > 0.0)
-    assert np.std([p[1] for p in poses]) == pytest.approx(0.001, rel=0.1)
+    poses = []
+    for k in range(2000):
+        one.effects.draw()
+        one.effects.bench.pose[0:4] = k / 120.0, 0.0, 0.0, 0.0
+        jitter(one.effects.acting["mocap_jitter"].arrays)
+        poses.append(one.effects.bench.pose[0:4].copy())
+    assert np.all(np.diff(np.array(poses)[:, 0]) > 0.0)
+    assert np.std(np.array(poses)[:, 1:]) == pytest.approx(0.001, rel=0.1)
 
 
 def test_dropouts_lose_their_share_and_bursts():
-    def kept(spec):
-        drop = plant(f"mocap_dropouts:{spec}")._effects._poses[0]
-        return [drop.pose((k / 120.0, np.zeros(3), np.ones(4))) for k in range(12000)]
+    def lost(spec):
+        one, found = plant(f"mocap_dropouts:{spec}"), []
+        for k in range(12000):
+            one.effects.draw()
+            one.effects.bench.lost = False
+            one.effects.bench.pose[0] = k / 120.0
+            drop(one.effects.acting["mocap_dropouts"].arrays)
+            found.append("x" if one.effects.bench.lost else ".")
+        return "".join(found)
 
-    single = kept("share=0.1,bursts=0")
-    assert sum(p is None for p in single) / 12000 == pytest.approx(0.1, abs=0.01)
-    bursts = kept("share=0,bursts=1,burst_time=0.05,longest=0.2")
-    lost = "".join("x" if p is None else "." for p in bursts)
-    longest = max(map(len, lost.split(".")))
-    assert 6 <= longest <= 1 + 0.2 * 120 and 0.02 < lost.count("x") / 12000 < 0.1
+    assert lost("share=0.1,bursts=0").count("x") / 12000 == pytest.approx(0.1, abs=0.01)
+    bursts = lost("share=0,bursts=1,burst_time=0.05,longest=0.2")
+    longest = max(map(len, bursts.split(".")))
+    assert 6 <= longest <= 1 + 0.2 * 120 and 0.02 < bursts.count("x") / 12000 < 0.1
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 360.0])
+def test_the_motion_capture_has_another_rate_and_delay(rate):
+    feed = f"mocap_feed:rate={rate},position_noise=0,attitude_noise=0,latency=0.02"
+    one, found, places = plant(feed), {}, []
+    for k in range(250):
+        sample = one.sense().mocap
+        places.append(one.truth().state[0, :3])
+        one.step(np.full(4, 0.7), np.zeros(2), False)
+        if sample is not None:
+            found[k] = sample
+    stamps = np.array([pose[0] for pose in found.values()])
+    assert len(stamps) == pytest.approx(min(rate, 250.0) * 0.98, abs=2)
+    assert np.all(np.diff(stamps) > 0.0)
+    for k, (stamp, place, _) in found.items():
+        assert 0.02 - 1e-9 <= 0.004 * k - stamp < 0.024
+        path = [np.interp(stamp, 0.004 * np.arange(250), axis) for axis in np.array(places).T]
+        assert place == pytest.approx(path, abs=5e-5)  # of its own time, also between two ticks
+
+
+# An effect of a user's own, in Python
+
+
+class Gust(Effect):
+    """Somebody's own effect."""
+
+    SOURCE = "a test of the simulator, no measurement"
+    lift: float = size("factor on the thrust", "1", 0.0, 2.0)
+
+    def begin(self, bench, noise):
+        return OwnGust(self, bench)
+
+
+class OwnGust(Acting):
+    def __init__(self, p, bench):
+        self.p, self.bench = p, bench
+
+    def tick(self):
+        if self.p.lift == 0.0:
+            raise ValueError("no lift")
+        self.bench.lift *= self.p.lift
+
+    def imu(self, gyro, force):
+        return gyro + 1.0, force
+
+    def pose(self, pose):
+        return None if pose[0] > 0.1 else (pose[0], pose[1] + 1.0, pose[2])
+
+    def lateness(self):
+        return 0.008
+
+
+def test_an_effect_in_python_acts_at_every_hook_and_its_errors_come_out(monkeypatch):
+    monkeypatch.setitem(EFFECTS, "gust", Gust)
+    monkeypatch.setattr(presets, "laboratory", lambda: {})
+    one = plant(
+        "gust:lift=0.5", "mocap_feed:rate=125,position_noise=0,attitude_noise=0,latency=0.0"
+    )
+    assert not one.compiled
+    samples, states = flown(one)
+    calm = flown(plant())[0]
+    assert samples[0].hil[1] == pytest.approx(calm[0].hil[1] + 1.0)
+    poses = {k: s.mocap for k, s in enumerate(samples) if s.mocap is not None}
+    assert min(poses) == 2 and max(pose[0] for pose in poses.values()) <= 0.1  # 8 ms late; lost
+    assert poses[2][1] == pytest.approx(states[0, 0, :3] + 1.0)
+    with pytest.raises(ValueError, match="no lift"):
+        flown(plant("gust:lift=0"))
 
 
 # Network

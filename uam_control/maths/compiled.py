@@ -24,6 +24,7 @@ F = TypeVar("F", bound=Callable)
 
 # an option of numba for its own use; without it, no function borrows: see `counts_references`
 _COUNTS = "_nrt" if hasattr(DefaultOptions, "_nrt") else ""
+_IN_C: list[object] = []  # owners of the machine code of `address_in_c`
 
 
 def active() -> bool:
@@ -54,6 +55,20 @@ def _compiled(function: F, counting: bool) -> F:
     if active():
         compiled._cache = CompileCache(function)
     return compiled
+
+
+def address_in_c(function: Callable[[int], int]) -> int:
+    """Return the address of a function of one address, compiled as by `borrowing`, in C's form.
+
+    It is valid until the process ends.
+    """
+    made = numba.njit(**_counting(False))(function)
+    made._cache = CompileCache(function)
+    signature = (numba.types.intp,)
+    made.compile(signature)
+    code = made.overloads[signature]
+    _IN_C.append(made)
+    return code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name)
 
 
 def inlined(function: F) -> F:

@@ -24,24 +24,24 @@ class Rotors:
     def __init__(self, numbers: dict, step: float) -> None:
         """numbers: the `rotors` entry of the vehicle; step: physics step [s]."""
         self.efficiency = np.array(numbers["efficiency"], dtype=float)
-        self.constants = np.array(
-            [
-                numbers["thrust_coefficient"],
-                numbers["thrust_coefficient"] * numbers["speed_max"] ** 2,
-                numbers["curve_factor"],
-            ]
-        )
-        self._lags, self._step = (numbers["lag_up"], numbers["lag_down"]), step
-        self.gains = np.empty((2, len(self.efficiency)))
+        full, factor = numbers["thrust_coefficient"], numbers["curve_factor"]
+        full *= numbers["speed_max"] ** 2
+        self.constants = np.array([numbers["thrust_coefficient"], full, 0.0, 1.0 - factor, factor])
+        lags = [[numbers["lag_up"]], [numbers["lag_down"]]]
+        self._lags, self._step = np.repeat(lags, len(self.efficiency), axis=1), step
+        self.gains = np.empty_like(self._lags)
         self.scale_lags(np.ones(len(self.efficiency)))
         self.speed = np.zeros(len(self.efficiency))
         self.thrust = np.zeros(len(self.efficiency))
 
     def scale_lags(self, factors: np.ndarray) -> None:
-        """Set the time constants of the rotors to factors (rotors,) times the vehicle's."""
-        for row, lag in enumerate(self._lags):
-            for i, factor in enumerate(factors):
-                self.gains[row, i] = 1.0 - math.exp(-self._step / (lag * factor))
+        """Multiply the time constants up and down (2, rotors) by factors of a shape like it."""
+        self._lags *= factors
+        self.gains[:] = [[1.0 - math.exp(-self._step / lag) for lag in row] for row in self._lags]
+
+    def turn_linearly(self, idle: float) -> None:
+        """Let the speed grow linearly with the command, from `idle` times the full speed on."""
+        self.constants[2:] = idle**2, 2.0 * idle * (1.0 - idle), (1.0 - idle) ** 2
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
         """Advance one physics step with commands (rotors,) 0..1; write thrust [N] to output
@@ -63,14 +63,15 @@ def rotor_step(
 ) -> None:
     """Advance rotors by one step: first-order speed lag, different up and down; T = c speed^2.
 
-    commands (rotors,) 0..1; constants (3,): of `Rotors`; gains (2, rotors): share of the difference
-    per step while speeding up and slowing down; efficiency (rotors,): factor on thrust; speed
-    (rotors,) [rad/s], thrust and output (rotors,) [N] are overwritten.
+    commands u (rotors,) 0..1; constants (5,): thrust coefficient, full thrust [N], then a, b, c of
+    T / full thrust = a + b u + c u^2; gains (2, rotors): share of the difference per step while
+    speeding up and slowing down; efficiency (rotors,): factor on thrust; speed (rotors,) [rad/s],
+    thrust and output (rotors,) [N] are overwritten.
     """
-    coefficient, thrust_max, factor = constants
+    coefficient, thrust_max, a, b, c = constants
     for i in range(len(commands)):
         u = min(max(commands[i], 0.0), 1.0)
-        desired = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
+        desired = math.sqrt(thrust_max * (c * u * u + b * u + a) / coefficient)
         gain = gains[0, i] if desired > speed[i] else gains[1, i]
         speed[i] += gain * (desired - speed[i])
         thrust[i] = efficiency[i] * coefficient * speed[i] * speed[i]

@@ -14,6 +14,7 @@ import numpy as np
 from uam_control.vehicle import Arm
 
 BASE, FACE = "base", "magnet_face"  # body and site of the MJCF
+MAGNET, END_EFFECTOR = "magnet", "end_effector"  # body of a magnet, site of an arm without one
 SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 NO_LENGTH = 1e-9  # [m]
 
@@ -47,6 +48,18 @@ def room_below(
         elif _is_part(model, body, first):
             arm.append(_lowest(model, data, geom))
     return min(arm) - min(gear) if gear else None
+
+
+def tip_of(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Return the place (3,) [m, ENU] of the magnet's pivot, or of the end effector: a view."""
+    if has(model, mujoco.mjtObj.mjOBJ_BODY, MAGNET):
+        return data.xpos[model.body(MAGNET).id]
+    return data.site_xpos[model.site(END_EFFECTOR).id]
+
+
+def has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
+    """Return whether the model has a part of this kind and name."""
+    return mujoco.mj_name2id(model, kind, name) >= 0
 
 
 def _posed(model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]) -> mujoco.MjData:

@@ -18,17 +18,9 @@ from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.magnet import magnet_constants
 from uam_sim_bridge.plant.observation import Observed, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
-from uam_sim_bridge.plant.physics import PhysicsArrays, actuate, average, begin_period
+from uam_sim_bridge.plant.physics import PhysicsArrays
 from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
-from uam_sim_bridge.plant.plant_tick import (
-    REAL,
-    WHOLE,
-    PlantArrays,
-    sense,
-    step,
-    take_due_poses,
-    take_samples,
-)
+from uam_sim_bridge.plant.plant_tick import REAL, WHOLE, PlantArrays, sense, step
 from uam_sim_bridge.plant.sensors import (
     BLOCK,
     PAYLOAD_POSE,
@@ -96,9 +88,7 @@ class MujocoPlant(Plant):
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
         self._hinge = PayloadHinge(model, data) if disturbed else None
         self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
-        effects = numbers["effects"]
-        self._effects = ActingEffects(effects, self._bench(), seed) if effects else None
-        self._rotor_factor = self.rotors.efficiency.copy()  # with the faults, without the effects
+        self.effects = ActingEffects(numbers["effects"], self._bench(), seed)
         self._unused_truth = np.empty(self.truth_row.width)
         self._prepare(air["gust"] > 0.0)
         self._undisturbed = (
@@ -215,14 +205,13 @@ class MujocoPlant(Plant):
         )
         self.arrays = a = PlantArrays(
             *(self._physics_arrays(), self._observed_arrays(), self.truth_row),
-            *(self._imu.noise.arrays, self._gust.arrays, self._mocap.arrays),
+            *(self._imu.noise.arrays, self._gust.arrays, self._mocap.arrays, self.effects.arrays),
             np.zeros((max(late) + 1, 6 + 3 * self.joints)),
             np.full(max(late) + 1, np.iinfo(np.int64).min),
             self.memory,
         )
         truth = self._unused_truth
-        self._sense, self._take_samples = bound(sense, a, truth), bound(take_samples, a, truth)
-        self._take_poses = bound(take_due_poses, a)
+        self._sense = bound(sense, a, truth)
         self._step = bound(step, a, motors, np.empty(self.joints), True)
         self._write_truth = prepared(write_truth, a.observed, 1.0, a.truth, truth)
 
@@ -230,14 +219,17 @@ class MujocoPlant(Plant):
         """Return the parts on which effects act."""
         first = self.vehicle.description.joint_names[0]
         return Bench(
-            self.vehicle,
-            self.model,
-            self.data,
-            self.rotors,
-            self.period,
-            (self.model.joint(first).dofadr[0], self.joints),
-            self._torque_control,
-            self.servos.torque,
+            vehicle=self.vehicle,
+            model=self.model,
+            data=self.data,
+            rotors=self.rotors,
+            mocap=self._mocap,
+            period=self.period,
+            arm=(self.model.joint(first).dofadr[0], self.joints),
+            torque_control=self._torque_control,
+            encoder_units=self._encoders.units,
+            sample=np.empty(6 + 3 * self.joints),
+            pose=self._mocap.arrays.taken[VEHICLE_POSE],
         )
 
     def _controls(self, names: Sequence[str]) -> np.ndarray:
@@ -262,41 +254,20 @@ class MujocoPlant(Plant):
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`."""
         self.draw_noise()
-        if self._effects is None:
-            self._sense(row)
-        else:
-            self._take_samples(row)
-            self._affect(self._effects)
-            self._mocap.receive(self.tick)
+        self._sense(row)
+        self.effects.check()
         return self.arrived()
 
     @property
     def compiled(self) -> bool:
         """Whether `sense` and `step` of `plant_tick` are all that a tick does."""
-        return self._effects is None and self._hinge is None
+        return self.effects.compiled and self._hinge is None
 
     def draw_noise(self) -> int:
         """Draw the noise that is due; return for how many ticks it lasts at least."""
-        poses = self._mocap.draw()
-        lasts = max(poses, int((poses - 1) * self._mocap.period / self.period))
         gusts = self._gust.draw() if self.gusty else BLOCK
-        return min(self._imu.noise.draw(), lasts, gusts)
-
-    def _affect(self, effects: ActingEffects) -> None:
-        """Let the effects act on the samples of this tick, and take its poses."""
-        a, mocap = self.arrays, self._mocap
-        row = a.samples[self.tick % len(a.samples)]
-        sample = row.copy()
-        row[0:3], row[3:6] = effects.imu(sample[0:3], sample[3:6])
-        if not self._take_poses():
-            return
-        pose, late = effects.pose(mocap.taken(VEHICLE_POSE))
-        due = self.tick + mocap.ticks + late
-        if pose is not None:
-            a.mocap.taken[VEHICLE_POSE] = pose[0], *pose[1], *pose[2]
-            mocap.send(VEHICLE_POSE, due)
-        if mocap.tracks:
-            mocap.send(PAYLOAD_POSE, due)
+        poses = self._mocap.draw(self.period)
+        return min(self._imu.noise.draw(), poses, gusts, self.effects.draw())
 
     def arrived(self) -> Samples:
         """Return the samples that have arrived at this tick, as copies."""
@@ -323,43 +294,17 @@ class MujocoPlant(Plant):
         self.draw_noise()
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
-        if self._effects is not None:
-            self._step_with_effects(self._effects, motor_commands, arm_command, magnet)
-            return
         error = self._step(motor_commands, arm_command, magnet)
+        self.effects.check()
         if error:
             raise PhysicsError(f"MuJoCo: {error_text(error)}")
-
-    def _step_with_effects(
-        self,
-        effects: ActingEffects,
-        motor_commands: np.ndarray,
-        arm_command: np.ndarray,
-        magnet: bool,
-    ) -> None:
-        """Advance one control period; effects act between its parts."""
-        arrays = self.arrays.physics
-        gust = self._gust() if self.gusty else np.zeros(3)
-        begin_period(arrays, arm_command, magnet, gust, self.tick)
-        effects.tick()
-        np.multiply(self._rotor_factor, effects.bench.lift, out=self.rotors.efficiency)
-        for _ in range(self._steps):
-            actuate(arrays, motor_commands)
-            for gear in effects.gears:
-                gear.joints()
-            try:
-                mujoco.mj_step(self.model, self.data)
-            except mujoco.FatalError as fatal:
-                raise PhysicsError(f"MuJoCo: {' '.join(str(fatal).split())}") from None
-            average(arrays, 1.0 / self._steps)
-        self.tick += 1
 
     def disturb(self, disturbance: Disturbance) -> None:
         """See `Plant.disturb`."""
         efficiency, friction, softness, gain = self._undisturbed
         model, dofs = self.model, self._arm_dofs
-        self._rotor_factor[:] = efficiency * disturbance.rotor_parts
-        self.rotors.efficiency[:] = self._rotor_factor
+        self.rotors.efficiency[:] = efficiency * disturbance.rotor_parts
+        self.effects.arrays.factor[:] = self.rotors.efficiency
         braked = disturbance.joint_friction > 0.0
         model.dof_frictionloss[dofs] = friction + disturbance.joint_friction
         model.dof_solimp[dofs, 0:2] = np.where(braked[:, None], STIFF, softness[:, 0:2])

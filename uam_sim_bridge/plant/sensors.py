@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
-from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
@@ -35,8 +35,14 @@ class Noise:
 
     used = Number()
 
-    def __init__(self, generator: np.random.Generator, deviations: np.ndarray) -> None:
-        self._generator, self._deviations = generator, deviations
+    def __init__(
+        self,
+        generator: np.random.Generator,
+        deviations: np.ndarray,
+        kind: str = "standard_normal",
+    ) -> None:
+        """kind: method of the generator; its numbers are multiplied by deviations (width,)."""
+        self._drawn, self.deviations = getattr(generator, kind), np.array(deviations, dtype=float)
         self.memory = record("used")
         self.used = BLOCK
         self.arrays = NoiseArrays(np.zeros((BLOCK, len(deviations))), self.memory)
@@ -46,11 +52,13 @@ class Noise:
         self.used += 1
         return self.arrays.rows[self.used - 1].copy()
 
-    def draw(self) -> int:
-        """Draw the next block if the present one is used up; return how many rows are left."""
-        if self.used == BLOCK:
+    def draw(self, least: int = 1) -> int:
+        """Draw new rows if less than `least` are left; return how many are left."""
+        left = BLOCK - self.used
+        if left < least:
             rows = self.arrays.rows
-            rows[:] = self._generator.standard_normal(rows.shape) * self._deviations
+            rows[:left] = rows[self.used :]
+            rows[left:] = self._drawn((self.used, rows.shape[1])) * self.deviations
             self.used = 0
         return BLOCK - self.used
 
@@ -127,7 +135,7 @@ WHOLE, REAL = "tracks ticks", "period next payload_top"
 class Mocap:
     """OptiTrack: poses of vehicle and payload at its own rate. No pose overtakes another.
 
-    `send`, `receive`: `send_pose`, `receive_poses`; `arrays`: never replaced; `tracks`, `ticks`,
+    `arrays`: never replaced, for `take_pose`, `send_pose`, `receive_poses`; `tracks`, `ticks`,
     `period`: see WHOLE, REAL.
     """
 
@@ -156,21 +164,23 @@ class Mocap:
             np.zeros(3),
             self.memory,
         )
-        self.send = bound(send_pose, self.arrays, 0, 0)
-        self.receive = bound(receive_poses, self.arrays, 0)
 
-    def draw(self) -> int:
-        """Draw noise; return for how many poses it is left."""
-        return min(noise.draw() for noise in self.noises)
+    def feed(self, rate: float, ticks: int, deviations: Sequence[float]) -> None:
+        """Change rate [Hz], delay [ticks] and noise (2,): of position [m] and attitude [rad]."""
+        self.period, self.ticks = 1.0 / rate, ticks
+        for noise in self.noises:
+            noise.deviations[:] = np.repeat(deviations, 3)
+
+    def draw(self, tick: float) -> int:
+        """Draw noise; return for how many ticks of `tick` [s] it is left."""
+        in_a_tick = math.ceil(tick / self.period)
+        left = min(noise.draw(in_a_tick) for noise in self.noises)
+        return max(1, int((left - in_a_tick) * self.period / tick))
 
     def arrived(self, body: int) -> tuple[float, np.ndarray, np.ndarray] | None:
         """Return stamp [s], position, quaternion of a pose that arrives at this tick."""
         row = self.arrays.arrived.item(body)
         return None if row < 0 else _parts(self.arrays.poses[body, row])
-
-    def taken(self, body: int) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return stamp [s], position, quaternion of a newest pose."""
-        return _parts(self.arrays.taken[body])
 
 
 def _parts(pose: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -179,28 +189,49 @@ def _parts(pose: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 @borrowing
-def take_poses(
-    a: MocapArrays, time: float, position: np.ndarray, quaternion: np.ndarray, payload: np.ndarray
+def take_pose(
+    a: MocapArrays,
+    time: float,
+    tick: float,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    velocity: np.ndarray,
+    rates: np.ndarray,
+    payload: np.ndarray,
 ) -> bool:
-    """Take the poses that are due at `time` [s], with noise; return whether one is.
+    """Take the next pose if it is due at `time` [s], with noise; return whether it is.
 
-    position (3,), quaternion (4,): of the vehicle; payload (7,): both. Call it once per tick.
+    tick [s]: since the last call at another time. A pose is of the tick at which it is taken; where
+    several are due in a tick, each is of its own time. position, velocity (3,), quaternion (4,),
+    rates (3,): of the vehicle; payload (7,): position and quaternion.
     """
     m = a.numbers[0]
     if time + 1e-9 < m.next:
         return False
-    if time > m.next + m.period:  # the first tick of a plant that begins later
+    if time > m.next + max(m.period, tick):  # the first tick of a plant that begins later
         m.next = time
+    ago = time - m.next if m.period < tick else 0.0
     m.next += m.period
     taken = a.taken[VEHICLE_POSE]
-    taken[0], noise = time, a.noise.rows[next_row(a.noise)]
+    taken[0], noise = time - ago, a.noise.rows[next_row(a.noise)]
     noisy_pose(position, quaternion, noise, taken[1:4], taken[4:POSE])
+    if ago > 0.0:
+        turn_back(taken, ago, velocity, rates)
     if m.tracks:
         taken = a.taken[PAYLOAD_POSE]
         taken[0], noise = time, a.payload_noise.rows[next_row(a.payload_noise)]
         write_grip(payload, m.payload_top, a.grip)
         noisy_pose(a.grip, payload[3:7], noise, taken[1:4], taken[4:POSE])
     return True
+
+
+@jit
+def turn_back(pose: np.ndarray, ago: float, velocity: np.ndarray, rates: np.ndarray) -> None:
+    """Change a pose (POSE,) to that of a time `ago` [s] before, at constant velocities (3,)."""
+    for i in range(3):
+        pose[1 + i] -= ago * velocity[i]
+    turn = quaternion_from_rotation_vector(-ago * rates)
+    pose[4:POSE] = quaternion_multiply(pose[4:POSE], turn)
 
 
 @borrowing
@@ -214,11 +245,12 @@ def send_pose(a: MocapArrays, body: int, due: int) -> None:
 
 @borrowing
 def receive_poses(a: MocapArrays, tick: int) -> None:
-    """Write which poses arrive at `tick`."""
+    """Write which poses arrive at `tick`: of several in a tick the newest one counts."""
     for body in range(2):
-        row, a.arrived[body] = a.first[body], -1
-        if a.count[body] and a.due[body, row] <= tick:
-            a.arrived[body], a.first[body] = row, (row + 1) % WAITING
+        a.arrived[body] = -1
+        while a.count[body] and a.due[body, a.first[body]] <= tick:
+            a.arrived[body] = a.first[body]
+            a.first[body] = (a.first[body] + 1) % WAITING
             a.count[body] -= 1
 
 

@@ -7,7 +7,7 @@ ranges of the joints and gravity are added from the description.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -24,12 +24,11 @@ from uam_control.vehicle import (
     VehicleError,
     load_description,
 )
-from uam_sim_bridge.plant.arm_geometry import BASE, SWING, measured_arm
+from uam_sim_bridge.plant.arm_geometry import BASE, MAGNET, SWING, measured_arm
 from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
-MAGNET = "magnet"  # body of the MJCF
 MASS_TOLERANCE = 1e-3  # relative
 LENGTH_TOLERANCE = 1e-3  # [m] of the section `arm`
 LOAD_BELOW = 0.0505  # [m] `variation.tip_mass` below the magnet's pivot: where a payload hangs
@@ -209,15 +208,31 @@ class Vehicle:
         """Change masses, inertias and centres of mass as `variation` says."""
         variation = self.numbers["variation"]
         offset, load = variation.get("base_offset", (0.0, 0.0)), variation.get("tip_mass", 0.0)
-        if variation["mass"] == variation["inertia"] == 1.0 and not (any(offset) or load):
+        mass, inertia = variation["mass"], variation["inertia"]
+        if mass == inertia == 1.0 and not (any(offset) or load):
             return
-        own = np.arange(model.nbody) != model.body(PAYLOAD).id
-        model.body_mass[own] *= variation["mass"]
-        model.body_inertia[own] *= variation["mass"] * variation["inertia"]
-        model.body_ipos[model.body(BASE).id][:2] += offset
+        vary(model, (mass, mass), (inertia, inertia), offset)
         if load:
             _add_point_mass(model, model.body(MAGNET).id, load, LOAD_BELOW)
-        mujoco.mj_setConst(model, mujoco.MjData(model))
+            mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def vary(
+    model: mujoco.MjModel,
+    masses: tuple[float, float],
+    inertias: tuple[float, float],
+    offset: Sequence[float],
+) -> None:
+    """Multiply the masses of base and arm, and further their inertias; move the centre of mass of
+    the base by `offset` [m], x y or x y z."""
+    base = model.body(BASE).id
+    own = model.body_rootid == base
+    mass = np.where(np.arange(model.nbody) == base, masses[0], masses[1])[own]
+    inertia = np.where(np.arange(model.nbody) == base, inertias[0], inertias[1])[own]
+    model.body_mass[own] *= mass
+    model.body_inertia[own] *= (mass * inertia)[:, None]
+    model.body_ipos[base][: len(offset)] += offset
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def _add_point_mass(model: mujoco.MjModel, body: int, mass: float, below: float) -> None:

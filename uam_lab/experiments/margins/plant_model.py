@@ -154,7 +154,7 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
     low, high = 0.0, 1.0
     while high - low > 1e-9:
         middle = 0.5 * (low + high)
-        factor = plant.constants[2]
+        factor = plant.constants[4]
         curve = full * (factor * middle**2 + (1.0 - factor) * middle) * np.mean(plant.efficiency)
         low, high = (middle, high) if curve < thrust else (low, middle)
     command = low

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.maths.hooks import Hook, compiled_hook, python_hook, table
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
-from uam_sim_bridge.plant.effects.effect import HOOKS, Acting, Bench, Pose
+from uam_sim_bridge.plant.effects.effect import HOOKS, Acting, Bench
+from uam_sim_bridge.plant.sensors import BLOCK
 
 
 def generator(seed: int, name: str) -> np.random.Generator:
@@ -18,42 +21,98 @@ def generator(seed: int, name: str) -> np.random.Generator:
     )
 
 
-class ActingEffects:
-    """The effects of a flight; `bench.lift` (rotors,) is the factor on the rotors' thrust."""
+class EffectArrays(NamedTuple):
+    """What the compiled tick has of the effects.
 
-    def __init__(self, effects: Mapping[str, Mapping[str, float]], bench: Bench, seed: int) -> None:
+    tick, joints, sample, pose (k, 2): hooks, see `hooks.table`; lift (rotors,), row: `sample` of
+    `Bench`; factor (rotors,): on the thrust without `lift`; numbers (1,): lost, late of `Bench`.
+    """
+
+    tick: np.ndarray
+    joints: np.ndarray
+    sample: np.ndarray
+    pose: np.ndarray
+    lift: np.ndarray
+    row: np.ndarray
+    factor: np.ndarray
+    numbers: np.ndarray
+
+
+class ActingEffects:
+    """The effects of a flight on its plant; `acting`: those that act in it, by name.
+
+    `compiled`: whether none of them is in Python.
+    """
+
+    def __init__(self, effects: Mapping[str, Mapping], bench: Bench, seed: int) -> None:
         """effects: name → parameters, see `presets.read`; seed: of the flight."""
-        self.bench = bench
-        made: list[Acting] = []
+        self.bench, self.acting = bench, dict[str, Acting]()
+        self._errors: list[BaseException] = []
         for name, kind in EFFECTS.items():
             if name in effects:
                 one = kind.from_mapping(dict(effects[name])).begin(bench, generator(seed, name))
                 if one is not None:
-                    made.append(one)
-        ticks, joints, imus, poses, late = (
-            [one for one in made if getattr(type(one), hook) is not getattr(Acting, hook)]
-            for hook in HOOKS
-        )
-        self._ticks, self._imus, self._poses, self._late = ticks, imus, poses, late
-        self.gears = tuple(joints)  # effects of the joints, at each physics step
+                    self.acting[name] = one
+        self._noises = [noise for one in self.acting.values() for noise in one.noises]
+        hooks = {name: self._hooks(name) for name in HOOKS}
+        self.compiled = all(one.STEPS for one in self.acting.values())
+        self._kept = hooks
+        tables = (table(hooks[name]) for name in HOOKS)
+        factor = bench.rotors.efficiency.copy()
+        self.arrays = EffectArrays(*tables, bench.lift, bench.sample, factor, bench.memory)
 
-    def tick(self) -> None:
-        """Set the loads and factors of the next control period."""
-        self.bench.lift[:] = 1.0
-        for one in self._ticks:
-            one.tick()
+    def _hooks(self, name: str) -> list[Hook]:
+        found = []
+        for one in self.acting.values():
+            if name in one.STEPS:
+                found.append(compiled_hook(one.STEPS[name], one.arrays))
+            elif not one.STEPS and (function := self._in_python(one, name)):
+                found.append(python_hook(self._safe(function)))
+        return found
 
-    def imu(self, gyro: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sample of the IMU: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU."""
-        for one in self._imus:
-            gyro, force = one.imu(gyro, force)
-        return gyro, force
+    def _in_python(self, one: Acting, hook: str) -> Callable[[], None] | None:
+        """Return what an effect in Python does at a hook; None for nothing."""
+        own = {
+            name for name in dir(Acting) if getattr(type(one), name) is not getattr(Acting, name)
+        }
+        if hook in ("tick", "joints"):
+            return getattr(one, hook) if hook in own else None
+        if hook == "sample":
+            return (lambda: self._change_imu(one)) if "imu" in own else None
+        return (lambda: self._change_pose(one)) if own & {"pose", "lateness"} else None
 
-    def pose(self, pose: Pose) -> tuple[Pose | None, int]:
-        """Return the mocap pose, None for a lost one, and its added delay in ticks."""
-        ticks = round(sum(one.lateness() for one in self._late) / self.bench.period)
-        changed: Pose | None = pose
-        for one in self._poses:
-            if changed is not None:
-                changed = one.pose(changed)
-        return changed, ticks
+    def _change_imu(self, one: Acting) -> None:
+        row = self.bench.sample
+        row[0:3], row[3:6] = one.imu(row[0:3].copy(), row[3:6].copy())
+
+    def _change_pose(self, one: Acting) -> None:
+        bench = self.bench
+        bench.late += one.lateness()
+        if bench.lost:
+            return
+        pose = bench.pose.copy()
+        changed = one.pose((pose.item(0), pose[1:4], pose[4:]))
+        if changed is None:
+            bench.lost = True
+        else:
+            bench.pose[:] = changed[0], *changed[1], *changed[2]
+
+    def _safe(self, function: Callable[[], None]) -> Callable[[], None]:
+        """Return the function without its errors: compiled code that calls it cannot pass them."""
+
+        def safe() -> None:
+            try:
+                function()
+            except Exception as error:
+                self._errors.append(error)
+
+        return safe
+
+    def check(self) -> None:
+        """Raise the first error of an effect in Python."""
+        if self._errors:
+            raise self._errors[0]
+
+    def draw(self) -> int:
+        """Draw the noise that is due; return for how many ticks it lasts."""
+        return min((noise.draw() for noise in self._noises), default=BLOCK)

@@ -2,7 +2,7 @@
 
 A marker sits on each rotor's mount and one on the top deck. Cameras stand on a ring around the
 room, high and low in turn. A camera does not see a marker if the line between them passes through
-the arm (capsules between the joints and the magnet) or the payload (a sphere at the magnet). A
+the arm (capsules between the joints and its tip) or the payload (a sphere at the tip). A
 marker needs two cameras, a pose three markers. Every marker has a calibration error, constant in a
 flight: the pose jumps when the set of seen markers changes, by the mean of the errors.
 """
@@ -10,18 +10,20 @@ flight: the pose jumps when the set of seen markers changes, by the mean of the 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.memory import put
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, Pose, size
-from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
+from uam_sim_bridge.plant.arm_geometry import tip_of
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.vehicle import PAYLOAD
 
 DECK = (0.0, 0.0, 0.08)  # [m, FLU] marker on the top deck
 FEWEST_CAMERAS, FEWEST_MARKERS = 2, 3
-AT_THE_MAGNET = 0.1  # [m] distance up to which the payload covers markers
+AT_THE_TIP = 0.1  # [m] distance up to which the payload covers markers
 
 
 class ArmOcclusion(Effect):
@@ -46,52 +48,6 @@ class ArmOcclusion(Effect):
         markers = np.vstack([bench.positions, DECK])
         errors = self.marker_error * noise.standard_normal(markers.shape)
         return _Occlusion(bench, cameras, markers, errors - errors.mean(axis=0), self.thickness)
-
-
-class _Occlusion(Acting):
-    def __init__(
-        self,
-        bench: Bench,
-        cameras: np.ndarray,
-        markers: np.ndarray,
-        errors: np.ndarray,
-        thickness: float,
-    ) -> None:
-        model = bench.model
-        joints = range(bench.arm_dofs.start, bench.arm_dofs.stop)
-        bodies = [model.jnt_bodyid[model.dof_jntid[dof]] for dof in joints]
-        self._chain = np.array([*bodies, model.body(MAGNET).id])
-        self._payload = model.body(PAYLOAD).id
-        self._bench, self._thickness = bench, thickness
-        self._cameras, self._markers, self._errors = cameras, markers, errors
-        self._arms = markers - markers.mean(axis=0)
-        self._seen = np.zeros(len(markers), dtype=np.bool_)
-
-    def pose(self, pose: Pose) -> Pose | None:
-        bench = self._bench
-        points = bench.data.xpos[self._chain]
-        payload = bench.data.xpos[self._payload]
-        if float(np.linalg.norm(payload - points[-1])) < AT_THE_MAGNET:
-            points = np.vstack([points, payload])
-        count = seen_markers(
-            bench.base_position,
-            bench.base_axes,
-            self._markers,
-            self._cameras,
-            points,
-            self._thickness,
-            self._seen,
-        )
-        if count == len(self._seen):
-            return pose
-        if count < FEWEST_MARKERS:
-            return None
-        shift = self._errors[self._seen].mean(axis=0)
-        arms = self._arms[self._seen] - self._arms[self._seen].mean(axis=0)
-        turn = np.cross(arms, self._errors[self._seen] - shift).sum(axis=0) / np.sum(arms * arms)
-        axes = bench.base_axes.reshape(3, 3)
-        turned = quaternion_multiply(pose[2], quaternion_from_rotation_vector(turn))
-        return pose[0], pose[1] + axes @ shift, turned
 
 
 @jit
@@ -147,3 +103,91 @@ def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> floa
         gap = a[k] + s * (b[k] - a[k]) - c[k] - t * (d[k] - c[k])
         squared += gap * gap
     return math.sqrt(squared)
+
+
+class OcclusionArrays(NamedTuple):
+    """pose, status (1,): of `Bench`; base, axes, markers, cameras, thickness, seen: see
+    `seen_markers`; errors (markers, 3) [m, FLU]: of the markers; bodies: xpos of MuJoCo; chain: the
+    arm's, base to tip; tip, payload (3,) [m, ENU]; points: for the arm and a held payload."""
+
+    pose: np.ndarray
+    status: np.ndarray
+    base: np.ndarray
+    axes: np.ndarray
+    markers: np.ndarray
+    cameras: np.ndarray
+    errors: np.ndarray
+    bodies: np.ndarray
+    chain: np.ndarray
+    tip: np.ndarray
+    payload: np.ndarray
+    points: np.ndarray
+    seen: np.ndarray
+    thickness: float
+
+
+@borrowing
+def hide(a: OcclusionArrays) -> int:
+    """Shift the newest pose by the errors of the markers that are seen; lose it with too few."""
+    n = len(a.chain)
+    for i in range(n):
+        put(a.bodies[a.chain[i]], a.points[i])
+    put(a.tip, a.points[n])
+    gap = 0.0
+    for k in range(3):
+        gap += (a.payload[k] - a.tip[k]) ** 2
+    held = gap < AT_THE_TIP * AT_THE_TIP
+    put(a.payload if held else a.tip, a.points[n + 1])
+    count = seen_markers(a.base, a.axes, a.markers, a.cameras, a.points, a.thickness, a.seen)
+    if count < FEWEST_MARKERS:
+        a.status[0].lost = 1
+    elif count < len(a.seen):
+        shift_pose(a.pose, a.axes, a.markers, a.errors, a.seen)
+    return 0
+
+
+@jit
+def shift_pose(
+    pose: np.ndarray, axes: np.ndarray, markers: np.ndarray, errors: np.ndarray, seen: np.ndarray
+) -> None:
+    """Move a pose (POSE,) as the mean errors of the seen markers do; arguments of `hide`."""
+    share = 1.0 / np.sum(seen)
+    middle, shift, moment, spread = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    for i in range(len(seen)):
+        if seen[i]:
+            middle += share * markers[i]
+            shift += share * errors[i]
+    for i in range(len(seen)):
+        if seen[i]:
+            arm = markers[i] - middle
+            moment += np.cross(arm, errors[i] - shift)
+            spread += np.sum(arm * arm)
+    for i in range(3):
+        for k in range(3):
+            pose[1 + i] += axes[3 * i + k] * shift[k]
+    turn = quaternion_from_rotation_vector(moment / spread)
+    pose[4:] = quaternion_multiply(pose[4:], turn)
+
+
+class _Occlusion(Acting):
+    STEPS: ClassVar = {"pose": hide}
+
+    def __init__(
+        self,
+        bench: Bench,
+        cameras: np.ndarray,
+        markers: np.ndarray,
+        errors: np.ndarray,
+        thickness: float,
+    ) -> None:
+        model, data = bench.model, bench.data
+        joints = model.dof_jntid[bench.arm_dofs]
+        chain, payload = (
+            model.jnt_bodyid[joints].astype(np.int64),
+            data.xpos[model.body(PAYLOAD).id],
+        )
+        self.arrays = OcclusionArrays(
+            *(bench.pose, bench.memory, bench.base_position, bench.base_axes),
+            *(markers, cameras, errors, data.xpos, chain, tip_of(model, data), payload),
+            *(np.zeros((len(chain) + 2, 3)), np.zeros(len(markers), dtype=np.bool_), thickness),
+        )

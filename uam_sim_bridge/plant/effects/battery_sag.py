@@ -9,10 +9,12 @@ Power: P = sum(T^1.5) / sqrt(2 rho A) / figure of merit (momentum theory), plus 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
 from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
 
 SMOOTHING = 0.1  # [s] of the current: the voltage follows the load after capacitors and ESCs
@@ -40,21 +42,41 @@ class BatterySag(Effect):
         return _Battery(self, bench, noise.uniform(self.start, 1.0))
 
 
-class _Battery(Acting):
-    def __init__(self, p: BatterySag, bench: Bench, charge: float) -> None:
-        self._p, self._bench, self._charge = p, bench, charge
-        self._nominal = bench.rotors.constants[1]
-        area = math.pi * bench.vehicle.description.rotor.radius**2
-        self._per_thrust = 1.0 / (p.figure_of_merit * math.sqrt(2.0 * AIR * area))
-        self._current = 0.0
-        self._gain = 1.0 - math.exp(-bench.period / SMOOTHING)
+class BatteryArrays(NamedTuple):
+    """thrust (rotors,) [N]; constants: of `rotor_step`; numbers (1,): state of charge, current [A],
+    nominal: full thrust [N] at the voltage `full`, per_thrust: electrical power [W] / sum(T^1.5),
+    gain: of the current's low-pass, period [s]; the others as in `BatterySag`."""
 
-    def tick(self) -> None:
-        p, bench = self._p, self._bench
-        rest = p.cells * (p.empty + (p.full - p.empty) * self._charge)
-        power = self._per_thrust * float(np.sum(bench.rotors.thrust**1.5)) + p.electronics
-        voltage = rest - p.cells * p.resistance * self._current
-        self._current += self._gain * (power / voltage - self._current)
-        used = self._current * bench.period / (3600.0 * p.capacity)
-        self._charge = max(0.0, self._charge - used)
-        bench.rotors.constants[1] = self._nominal * (voltage / (p.cells * p.full)) ** 2
+    thrust: np.ndarray
+    constants: np.ndarray
+    numbers: np.ndarray
+
+
+@borrowing
+def discharge(a: BatteryArrays) -> int:
+    """Take the charge of a control period; set the full thrust to that at the voltage."""
+    m, ideal = a.numbers[0], 0.0
+    rest = m.cells * (m.empty_cell + (m.full - m.empty_cell) * m.charge)
+    for thrust in a.thrust:
+        ideal += thrust**1.5
+    voltage = rest - m.cells * m.resistance * m.current
+    m.current += m.gain * ((m.per_thrust * ideal + m.electronics) / voltage - m.current)
+    m.charge = max(0.0, m.charge - m.current * m.period / (3600.0 * m.capacity))
+    a.constants[1] = m.nominal * (voltage / (m.cells * m.full)) ** 2
+    return 0
+
+
+class _Battery(Acting):
+    STEPS: ClassVar = {"tick": discharge}
+
+    def __init__(self, p: BatterySag, bench: Bench, charge: float) -> None:
+        area = math.pi * bench.vehicle.description.rotor.radius**2
+        names = "charge current cells full empty_cell resistance electronics capacity"
+        numbers = record("", f"{names} nominal per_thrust gain period")
+        numbers[0] = (
+            *(charge, 0.0, p.cells, p.full, p.empty, p.resistance, p.electronics, p.capacity),
+            bench.rotors.constants[1],
+            1.0 / (p.figure_of_merit * math.sqrt(2.0 * AIR * area)),
+            *(1.0 - math.exp(-bench.period / SMOOTHING), bench.period),
+        )
+        self.arrays = BatteryArrays(bench.rotors.thrust, bench.rotors.constants, numbers)

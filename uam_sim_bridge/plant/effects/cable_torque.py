@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from uam_control.maths.compiled import borrowing
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
 
 
@@ -29,13 +30,17 @@ class CableTorque(Effect):
         return _CableTorque(bench, stiffness, rest)
 
 
-class _CableTorque(Acting):
-    def __init__(self, bench: Bench, stiffness: np.ndarray, rest: np.ndarray) -> None:
-        dofs = bench.arm_dofs
-        start = bench.model.jnt_qposadr[bench.model.dof_jntid[dofs.start]]
-        self._alpha = bench.data.qpos[start : start + bench.arm[1]]
-        self._torque = bench.data.qfrc_applied[dofs]
-        self._stiffness, self._rest = stiffness, rest
+@borrowing
+def pull(a: tuple) -> int:
+    """Set the torques (n,) [N m] of springs: their angles, stiffnesses and rest angles (n,)."""
+    torque, angles, stiffness, rest = a
+    for i in range(len(torque)):
+        torque[i] = stiffness[i] * (rest[i] - angles[i])
+    return 0
 
-    def tick(self) -> None:
-        np.multiply(self._stiffness, self._rest - self._alpha, out=self._torque)
+
+class _CableTorque(Acting):
+    STEPS: ClassVar = {"tick": pull}
+
+    def __init__(self, bench: Bench, stiffness: np.ndarray, rest: np.ndarray) -> None:
+        self.arrays = bench.data.qfrc_applied[bench.arm_dofs], bench.angles, stiffness, rest

@@ -14,12 +14,13 @@ the flow, as its top (7 x 7 cm) is small against a disc.
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
+from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 from uam_sim_bridge.plant.vehicle import PAYLOAD
 
 EDDY = 0.1  # [s] correlation time of the turbulence: some decimetres at 5 m/s
@@ -41,38 +42,6 @@ class Downwash(Effect):
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
         return _Downwash(self, bench, noise)
-
-
-class _Downwash(Acting):
-    def __init__(self, p: Downwash, bench: Bench, noise: np.random.Generator) -> None:
-        model, data = bench.model, bench.data
-        edges = 2.0 * model.geom(PAYLOAD).size
-        area = float(edges[0] * edges[1])
-        self._radius = bench.vehicle.description.rotor.radius
-        self._spreading, self._drag_area = p.spreading, p.drag * area
-        self._turbulence, self._noise = p.turbulence, noise
-        self._keep, self._eddy = math.exp(-bench.period / EDDY), 0.0
-        body = model.body(PAYLOAD).id
-        self._force, self._payload = data.xfrc_applied[body, 0:3], data.xpos[body]
-        self._bench = bench
-
-    def tick(self) -> None:
-        bench, keep = self._bench, self._keep
-        fresh = self._turbulence * math.sqrt(1.0 - keep * keep)
-        self._eddy = keep * self._eddy + fresh * self._noise.standard_normal()
-        flux = momentum(
-            self._payload - bench.base_position,
-            bench.base_axes,
-            bench.positions,
-            bench.rotors.thrust,
-            self._radius,
-            self._spreading,
-        )
-        force = 0.5 * AIR * self._drag_area * flux * (1.0 + self._eddy) ** 2
-        if force < STILL:
-            self._force[:] = 0.0
-        else:
-            self._force[:] = -force * bench.base_axes[2::3]
 
 
 @jit
@@ -104,3 +73,53 @@ def momentum(
         centre = 2.0 * math.log(2.0) * thrust[i] / (AIR * math.pi * squared)
         total += centre * math.exp(-2.0 * math.log(2.0) * across / squared)
     return total
+
+
+class DownwashArrays(NamedTuple):
+    """offset (3,) [m]: for `push`; payload (3,) [m, ENU], force (3,) [N, ENU] on it; base to
+    radius, spreading: see `momentum`; eddies: white noise, eddy (1,): the present eddy's part of
+    the mean velocity, keep: of an eddy in a tick; pressure [kg/m]: force / u^2."""
+
+    payload: np.ndarray
+    force: np.ndarray
+    offset: np.ndarray
+    base: np.ndarray
+    axes: np.ndarray
+    positions: np.ndarray
+    thrust: np.ndarray
+    eddies: NoiseArrays
+    eddy: np.ndarray
+    radius: float
+    spreading: float
+    keep: float
+    pressure: float
+
+
+@borrowing
+def push(a: DownwashArrays) -> int:
+    """Set the force on the payload for a control period."""
+    a.eddy[0] = a.keep * a.eddy[0] + a.eddies.rows[next_row(a.eddies), 0]
+    for i in range(3):
+        a.offset[i] = a.payload[i] - a.base[i]
+    flux = momentum(a.offset, a.axes, a.positions, a.thrust, a.radius, a.spreading)
+    force = a.pressure * flux * (1.0 + a.eddy[0]) ** 2
+    for i in range(3):
+        a.force[i] = -force * a.axes[3 * i + 2] if force >= STILL else 0.0
+    return 0
+
+
+class _Downwash(Acting):
+    STEPS: ClassVar = {"tick": push}
+
+    def __init__(self, p: Downwash, bench: Bench, noise: np.random.Generator) -> None:
+        body, edges = bench.model.body(PAYLOAD).id, 2.0 * bench.model.geom(PAYLOAD).size
+        keep = math.exp(-bench.period / EDDY)
+        eddies = Noise(noise, np.array([p.turbulence * math.sqrt(1.0 - keep * keep)]))
+        self.noises = (eddies,)
+        self.arrays = DownwashArrays(
+            *(bench.data.xpos[body], bench.data.xfrc_applied[body, 0:3], np.zeros(3)),
+            *(bench.base_position, bench.base_axes, bench.positions, bench.rotors.thrust),
+            *(eddies.arrays, np.zeros(1)),
+            *(bench.vehicle.description.rotor.radius, p.spreading, keep),
+            0.5 * AIR * p.drag * float(edges[0] * edges[1]),
+        )

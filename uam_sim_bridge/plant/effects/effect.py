@@ -8,17 +8,20 @@ in config/plant/; a parameter has no default.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, dataclass_transform
 
 import mujoco
 import numpy as np
 
+from uam_control.maths.memory import Number, record
 from uam_control.settings.named_set import NamedSet
-from uam_control.settings.parameter_set import Bound, number
+from uam_control.settings.parameter_set import ANY_LENGTH, Bound, number, vector
 from uam_sim_bridge.plant.actuators import Rotors
-from uam_sim_bridge.plant.vehicle import Vehicle
+from uam_sim_bridge.plant.engines import PlantError
+from uam_sim_bridge.plant.sensors import Mocap, Noise
+from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
 Pose = tuple[float, np.ndarray, np.ndarray]  # stamp [s], position [m, ENU], quaternion [w x y z]
 
@@ -30,30 +33,52 @@ def size(description: str, unit: str, low: float, high: float) -> Any:
     return number(math.nan, description, unit, low, high)
 
 
+def each(description: str, unit: str, low: float, high: float, optional: bool = False) -> Any:
+    """Declare a parameter with a number for each rotor or joint, or one for all of them.
+
+    optional: the list may be empty.
+    """
+    return vector((), description, unit, low, high, ANY_LENGTH, optional)
+
+
+def several(description: str, unit: str, low: float, high: float, length: int = 3) -> Any:
+    """Declare a parameter of `length` numbers."""
+    return vector((), description, unit, low, high, length)
+
+
 @dataclass
 class Bench:
-    """The parts of a plant on which effects act.
+    """The parts of a plant on which effects act. Its arrays never move.
 
-    rotors: their efficiency and constants may change; arm: first degree of freedom and number of
-    joints; lift (rotors,): factors on the thrust of the next tick, set to 1 before each tick;
-    positions (rotors, 3) [m, FLU] and directions (rotors,), 1 for counter-clockwise.
+    rotors: their efficiency and constants may change; mocap; arm: first degree of freedom and
+    number of joints; torque_control (n,) [N m]: on the joints; encoder_units (2,): see `quantised`;
+    sample (6 + 3 n,): newest of IMU and joints, see `PlantArrays`; pose (POSE,): newest of the
+    motion capture; lift (rotors,): factors on the thrust of the next tick, set to 1 before each
+    tick; positions (rotors, 3) [m, FLU] and directions (rotors,), 1 for counter-clockwise.
+    `lost`: whether the newest pose is; `late` [s]: its added delay.
     """
 
     vehicle: Vehicle
     model: mujoco.MjModel
     data: mujoco.MjData
     rotors: Rotors
+    mocap: Mocap
     period: float
     arm: tuple[int, int]
     torque_control: np.ndarray
-    servo_torque: np.ndarray
+    encoder_units: np.ndarray
+    sample: np.ndarray
+    pose: np.ndarray
+
+    lost, late = Number(), Number()
 
     def __post_init__(self) -> None:
+        self.memory = record("lost", "late")
         rotors = self.vehicle.description.rotors
         self.lift = np.ones(len(rotors))
         self.positions = np.array([rotor.position for rotor in rotors])
         self.directions = np.array([1.0 if r.counter_clockwise else -1.0 for r in rotors])
-        base = self.model.body("base").id
+        base = self.model.body(BASE).id
         self.base_position = self.data.xpos[base]
         self.base_axes = self.data.xmat[base]  # row by row, body → world
 
@@ -62,9 +87,33 @@ class Bench:
         """Degrees of freedom of the joints."""
         return slice(self.arm[0], self.arm[0] + self.arm[1])
 
+    @property
+    def angles(self) -> np.ndarray:
+        """Angles of the joints (n,) [rad], a view."""
+        start = self.model.jnt_qposadr[self.model.dof_jntid[self.arm[0]]]
+        return self.data.qpos[start : start + self.arm[1]]
+
+    def for_each(self, name: str, values: Sequence[float], count: int, of: str) -> np.ndarray:
+        """Return values (count,) of a parameter declared by `each`; raise PlantError."""
+        if len(values) not in (1, count):
+            raise PlantError(
+                f"effect {name}: {len(values)} numbers; allowed: one, or one for each of the "
+                f"{count} {of} of {self.vehicle.description.name}"
+            )
+        return np.resize(np.array(values), count)
+
 
 class Acting:
-    """An effect in a flight. A subclass implements some of the methods; see `HOOKS`."""
+    """An effect in a flight, compiled or in Python.
+
+    STEPS: compiled functions of the one tuple `arrays`, which return 0, by the names of HOOKS;
+    noises: of which a tick uses at most one row each. In Python a subclass implements some of the
+    methods instead.
+    """
+
+    STEPS: ClassVar[Mapping[str, Callable[[tuple], int]]] = {}
+    arrays: tuple = ()
+    noises: Sequence[Noise] = ()
 
     def tick(self) -> None:
         """Set the loads of the next control period."""
@@ -86,10 +135,12 @@ class Acting:
         return 0.0
 
 
-HOOKS = ("tick", "joints", "imu", "pose", "lateness")
+# tick: before the physics of a control period; joints: at each physics step, changes
+# `Bench.torque_control`; sample, pose: change `Bench.sample`, `Bench.pose` when they are taken
+HOOKS = ("tick", "joints", "sample", "pose")
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(size,))
+@dataclass_transform(frozen_default=True, field_specifiers=(size, each, several))
 class Effect(NamedSet):
     """Base of all effects. SOURCE: where model and numbers are from."""
 
@@ -104,5 +155,5 @@ class Effect(NamedSet):
 
     @classmethod
     def ranges(cls) -> Sequence[tuple[str, Bound]]:
-        """Return name and range of each parameter."""
+        """Return name and range of each number."""
         return [(name, spec) for name, spec in cls.specs().items() if isinstance(spec, Bound)]

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
 
 LOWEST = 0.5  # [1] of the radius: the formula is not valid below
@@ -41,15 +41,6 @@ class GroundEffect(Effect):
         near = float(np.where(apart > 0.0, apart, np.inf).min())
         shape = np.array([radius, near, float(apart.max()), self.fountain, self.strength])
         return _GroundEffect(bench, shape)
-
-
-class _GroundEffect(Acting):
-    def __init__(self, bench: Bench, shape: np.ndarray) -> None:
-        self._bench, self._shape = bench, shape
-
-    def tick(self) -> None:
-        bench = self._bench
-        raise_thrust(bench.base_position, bench.base_axes, bench.positions, self._shape, bench.lift)
 
 
 @jit
@@ -82,3 +73,17 @@ def raise_thrust(
         for k in range(3):
             height += axes[6 + k] * positions[i, k]
         lift[i] *= thrust_ratio(height, shape)
+
+
+@borrowing
+def lift(a: tuple) -> int:
+    """Do `raise_thrust` with the arguments `a`."""
+    raise_thrust(a[0], a[1], a[2], a[3], a[4])
+    return 0
+
+
+class _GroundEffect(Acting):
+    STEPS: ClassVar = {"tick": lift}
+
+    def __init__(self, bench: Bench, shape: np.ndarray) -> None:
+        self.arrays = bench.base_position, bench.base_axes, bench.positions, shape, bench.lift

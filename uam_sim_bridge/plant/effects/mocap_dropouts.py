@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, Pose, size
+from uam_control.maths.compiled import borrowing
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
 class MocapDropouts(Effect):
@@ -23,20 +25,49 @@ class MocapDropouts(Effect):
     longest: float = size("longest burst", "s", 0.0, 2.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Dropouts(self, noise, bench.vehicle.numbers["sensors"]["mocap"]["rate"])
+        return _Dropouts(self, bench, noise)
+
+
+class DropoutArrays(NamedTuple):
+    """pose: of `Bench`; shares: uniform noise, lengths [s]: of bursts; status (1,): of `Bench`;
+    until (1,) [s]: end of the burst; share, begins: parts of the poses, longest [s]."""
+
+    pose: np.ndarray
+    shares: NoiseArrays
+    lengths: NoiseArrays
+    status: np.ndarray
+    until: np.ndarray
+    share: float
+    begins: float
+    longest: float
+
+
+@borrowing
+def drop(a: DropoutArrays) -> int:
+    """Lose the newest pose, or not."""
+    drawn = a.shares.rows[next_row(a.shares)]
+    length = min(a.longest, a.lengths.rows[next_row(a.lengths), 0])
+    in_burst = a.pose[0] < a.until[0]
+    if not in_burst and drawn[1] < a.begins:
+        a.until[0] = a.pose[0] + length
+        in_burst = True
+    if in_burst or drawn[0] < a.share:
+        a.status[0].lost = 1
+    return 0
 
 
 class _Dropouts(Acting):
-    def __init__(self, p: MocapDropouts, noise: np.random.Generator, rate: float) -> None:
-        self._p, self._noise, self._begins = p, noise, p.bursts / rate
-        self._until = -1.0  # [s]
+    STEPS: ClassVar = {"pose": drop}
 
-    def pose(self, pose: Pose) -> Pose | None:
-        lost, begins = self._noise.random(2)
-        length = min(self._p.longest, self._p.burst_time * self._noise.standard_exponential())
-        if pose[0] < self._until:
-            return None
-        if begins < self._begins:
-            self._until = pose[0] + length
-            return None
-        return None if lost < self._p.share else pose
+    def __init__(self, p: MocapDropouts, bench: Bench, noise: np.random.Generator) -> None:
+        shares, lengths = noise.spawn(2)
+        self.noises = (
+            Noise(shares, np.ones(2), "random"),
+            Noise(lengths, np.array([p.burst_time]), "standard_exponential"),
+        )
+        self.arrays = DropoutArrays(
+            bench.pose,
+            *(one.arrays for one in self.noises),
+            *(bench.memory, np.full(1, -1.0)),
+            *(p.share, p.bursts * bench.mocap.period, p.longest),
+        )

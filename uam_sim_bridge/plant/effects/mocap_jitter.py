@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, Pose, size
+from uam_control.maths.compiled import borrowing
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
 class MocapJitter(Effect):
@@ -24,21 +26,39 @@ class MocapJitter(Effect):
     wander_time: float = size("its correlation time", "s", 0.01, 1000.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        rate = bench.vehicle.numbers["sensors"]["mocap"]["rate"]
-        return _Jitter(self, noise, math.exp(-1.0 / (rate * self.wander_time)))
+        return _Jitter(self, bench, noise)
+
+
+class JitterArrays(NamedTuple):
+    """pose: of `Bench`; noise: of the wander (3,) [m] and of a stamp [s]; error (3,) [m]: the
+    wander; last (1,) [s]: newest stamp; keep: of the wander from pose to pose."""
+
+    pose: np.ndarray
+    noise: NoiseArrays
+    error: np.ndarray
+    last: np.ndarray
+    keep: float
+
+
+@borrowing
+def jitter(a: JitterArrays) -> int:
+    """Change stamp and position of the newest pose; stamps of one receiver never go back."""
+    drawn = a.noise.rows[next_row(a.noise)]
+    for i in range(3):
+        a.error[i] = a.keep * a.error[i] + drawn[i]
+        a.pose[1 + i] += a.error[i]
+    a.pose[0] = max(0.0, a.pose[0] + drawn[3], a.last[0] + 1e-6)
+    a.last[0] = a.pose[0]
+    return 0
 
 
 class _Jitter(Acting):
-    def __init__(self, p: MocapJitter, noise: np.random.Generator, keep: float) -> None:
-        self._noise, self._keep = noise, keep
-        self._step, self._stamp = p.wander * math.sqrt(1.0 - keep * keep), p.stamp
-        self._error = p.wander * noise.standard_normal(3)
-        self._last = -math.inf
+    STEPS: ClassVar = {"pose": jitter}
 
-    def pose(self, pose: Pose) -> Pose:
-        drawn = self._noise.standard_normal(4)
-        self._error = self._keep * self._error + self._step * drawn[:3]
-        # stamps of one receiver never go back
-        stamp = max(0.0, pose[0] + self._stamp * float(drawn[3]), self._last + 1e-6)
-        self._last = stamp
-        return stamp, pose[1] + self._error, pose[2]
+    def __init__(self, p: MocapJitter, bench: Bench, noise: np.random.Generator) -> None:
+        keep = math.exp(-bench.mocap.period / p.wander_time)
+        error = p.wander * noise.standard_normal(3)
+        step = p.wander * math.sqrt(1.0 - keep * keep)
+        self.noises = (Noise(noise, np.array([step, step, step, p.stamp])),)
+        last = np.full(1, -np.inf)
+        self.arrays = JitterArrays(bench.pose, self.noises[0].arrays, error, last, keep)

@@ -14,8 +14,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from uam_control.maths.compiled import borrowing
 from uam_control.settings.json_text import read_mapping
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.sensors import Noise, next_row
 
 BLOCK = 4096  # draws per call of the generator; the sequence is the same for any
 
@@ -35,16 +37,23 @@ class NetworkDelay(Effect):
     longest: float = size("longest added delay of both", "s", 0.0, 0.5)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _PoseDelay(self, noise)
+        return _PoseDelay(self, bench, noise)
+
+
+@borrowing
+def delay(a: tuple) -> int:
+    """Add to the delay of the newest pose: its status, added delays [s], the fixed and longest."""
+    status, added, fixed, longest = a
+    status[0].late += fixed + min(longest, added.rows[next_row(added), 0])
+    return 0
 
 
 class _PoseDelay(Acting):
-    def __init__(self, p: NetworkDelay, noise: np.random.Generator) -> None:
-        self._p, self._noise = p, noise
+    STEPS: ClassVar = {"pose": delay}
 
-    def lateness(self) -> float:
-        p = self._p
-        return p.mocap + min(p.longest, p.mocap_jitter * self._noise.standard_exponential())
+    def __init__(self, p: NetworkDelay, bench: Bench, noise: np.random.Generator) -> None:
+        self.noises = (Noise(noise, np.array([p.mocap_jitter]), "standard_exponential"),)
+        self.arrays = bench.memory, self.noises[0].arrays, p.mocap, p.longest
 
 
 class SetpointDelay:

@@ -3,6 +3,7 @@
     ground_effect: {strength: 1.0, fountain: 2.0}
     downwash: on            as in laboratory.yaml
     battery_sag: off
+    servo_noise: {torque: [0.022, 0.015], bandwidth: 5.0}      a number for each joint
 
 A parameter that a file does not give is that of laboratory.yaml.
 """
@@ -18,14 +19,14 @@ from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.engines import PlantError
 
 CALM, LABORATORY = "calm", "laboratory"
-Effects = dict[str, dict[str, float]]  # name → parameters
+Effects = dict[str, dict[str, float | list[float]]]  # name → parameters
 
 
 def read(presets: Sequence[str] = (), switches: Sequence[str] = ()) -> Effects:
     """Return the effects of presets (names or files) and switches; later ones override.
 
-    switches: NAME, NAME=off or NAME:parameter=value,...  Raises PlantError, ConfigurationError in
-    one line.
+    switches: NAME, NAME=off or NAME:parameter=value,...; a list's values have / between them.
+    Raises PlantError, ConfigurationError in one line.
     """
     effects: Effects = {}
     for preset in presets:
@@ -49,11 +50,12 @@ def added(changes: Mapping[str, object], effects: Effects) -> dict[str, object]:
 def _switch(text: str) -> tuple[str, object]:
     name, colon, rest = text.partition(":")
     if colon:
-        found: dict[str, float] = {}
+        found: dict[str, float | list[float]] = {}
         for key, _, value in (part.partition("=") for part in rest.split(",")):
             if key in found:
                 raise PlantError(f"--effect {text}: {key} is given twice")
-            found[key] = _number(text, value)
+            numbers = [_number(text, one) for one in value.split("/")]
+            found[key] = numbers if len(numbers) > 1 else numbers[0]
         return name, found
     name, _, state = text.partition("=")
     if state not in ("", "on", "off"):
@@ -78,6 +80,9 @@ def _change(effects: Effects, name: object, value: object, where: str) -> None:
         raise PlantError(f"{where}{name}: {value!r}: on, off or parameters expected")
     usual = effects.get(name) or laboratory().get(name, {})
     given = {} if value is True else dict(value)
+    for parameter, number in given.items():  # a number is a list of one
+        if isinstance(getattr(EFFECTS[name], parameter, None), tuple):
+            given[parameter] = number if isinstance(number, list) else [number]
     try:
         checked = EFFECTS[name].from_mapping(usual | given)
     except ParameterError as error:
@@ -91,6 +96,12 @@ def laboratory() -> Effects:
     return yaml_file.read(configuration.path(f"plant/{LABORATORY}.yaml"), PlantError)
 
 
+def _shown(value: float | list[float]) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_shown, value))}]"
+    return f"{value:g}"
+
+
 def table() -> str:
     """Return effects, sources and the laboratory's numbers in Markdown: of docs/plant.md."""
     lines = ["| effect | does | parameters (range: laboratory) | source |", "|---|---|---|---|"]
@@ -98,7 +109,7 @@ def table() -> str:
         kind = EFFECTS[name]
         words = "; ".join(
             f"`{parameter}`: {spec.description} ({spec.allowed.removesuffix(' 1')}: "
-            f"{values[parameter]:g})"
+            f"{_shown(values.get(parameter, []))})"
             for parameter, spec in kind.ranges()
         )
         lines.append(f"| `{name}` | {kind.ABOUT} | {words} | {kind.SOURCE} |")

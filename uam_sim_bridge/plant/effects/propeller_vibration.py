@@ -14,8 +14,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.vehicle import BASE
 
 BLADES = 2
 
@@ -39,36 +40,17 @@ class PropellerVibration(Effect):
         return _Vibration(self, bench, spread, phases)
 
 
-class _Vibration(Acting):
-    def __init__(
-        self, p: PropellerVibration, bench: Bench, imbalance: np.ndarray, phases: np.ndarray
-    ) -> None:
-        model, base = bench.model, bench.model.body("base").id
-        self._rotors = bench.rotors
-        self._shaken = Shaken(
-            bench.directions,
-            bench.positions,
-            phases,
-            imbalance,
-            p.blade_passing * bench.vehicle.description.rotor.thrust_coefficient,
-            p.frame_gain / float(model.body_subtreemass[base]),
-            p.frame_gain / model.body_inertia[base],
-            bench.period,
-        )
-
-    def imu(self, gyro: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return vibrated(gyro, force, self._rotors.speed, self._shaken)
-
-
 class Shaken(NamedTuple):
     """Rotors and frame.
 
-    directions (rotors,): 1 counter-clockwise; positions (rotors, 3) [m, FLU]; phases (rotors,)
-    [rad]: their state; imbalance (rotors,) [kg m]; blade [N s^2/rad^2]: amplitude of the thrust /
-    speed^2; mass: frame gain / mass [1/kg]; inertia (3,): frame gain / inertia [1/(kg m^2)]; period
-    [s]: of a sample.
+    sample: see `Bench`; speed (rotors,) [rad/s]; directions (rotors,): 1 counter-clockwise;
+    positions (rotors, 3) [m, FLU]; phases (rotors,) [rad]: their state; imbalance (rotors,) [kg m];
+    blade [N s^2/rad^2]: amplitude of the thrust / speed^2; mass: frame gain / mass [1/kg]; inertia
+    (3,): frame gain / inertia [1/(kg m^2)]; period [s]: of a sample.
     """
 
+    sample: np.ndarray
+    speed: np.ndarray
     directions: np.ndarray
     positions: np.ndarray
     phases: np.ndarray
@@ -89,35 +71,50 @@ def mean_of_wave(phase: float, angle: float) -> tuple[float, float]:
     return cosine, (math.cos(phase) - math.cos(end)) / angle
 
 
-@jit
-def vibrated(
-    gyro: np.ndarray, force: np.ndarray, speed: np.ndarray, shaken: Shaken
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU, with the vibration.
-
-    speed (rotors,) [rad/s]. The phases advance by one period.
-    """
-    directions, positions, phases, imbalance, blade, mass, inertia, period = shaken
-    rates, acceleration = gyro.copy(), force.copy()
-    for i in range(len(speed)):
-        omega = speed[i]
+@borrowing
+def vibrate(a: Shaken) -> int:
+    """Add the vibration to gyro and specific force; the phases advance by one period."""
+    sample, inertia = a.sample, a.inertia
+    for i in range(len(a.speed)):
+        omega = a.speed[i]
         if omega < 1.0:
             continue
-        angle = omega * period
-        x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
-        cosine, sine = mean_of_wave(phases[i], angle)
-        across = imbalance[i] * omega * omega
-        fx, fy = across * cosine, across * directions[i] * sine
-        cosine2, sine2 = mean_of_wave(BLADES * phases[i], BLADES * angle)
-        up = blade * omega * omega
-        acceleration[0] += mass * fx
-        acceleration[1] += mass * fy
-        acceleration[2] += mass * up * cosine2
+        angle = omega * a.period
+        x, y, z = a.positions[i, 0], a.positions[i, 1], a.positions[i, 2]
+        cosine, sine = mean_of_wave(a.phases[i], angle)
+        across = a.imbalance[i] * omega * omega
+        fx, fy = across * cosine, across * a.directions[i] * sine
+        cosine2, sine2 = mean_of_wave(BLADES * a.phases[i], BLADES * angle)
+        up = a.blade * omega * omega
+        sample[3] += a.mass * fx
+        sample[4] += a.mass * fy
+        sample[5] += a.mass * up * cosine2
         # body rates are the integrals of torque / inertia: divided by the frequency, 90 deg behind
-        gx, gy = across * sine / omega, -across * directions[i] * cosine / omega
+        gx, gy = across * sine / omega, -across * a.directions[i] * cosine / omega
         gz = up * sine2 / (BLADES * omega)
-        rates[0] += inertia[0] * (y * gz - z * gy)
-        rates[1] += inertia[1] * (z * gx - x * gz)
-        rates[2] += inertia[2] * (x * gy - y * gx)
-        phases[i] = (phases[i] + angle) % (2.0 * math.pi)
-    return rates, acceleration
+        sample[0] += inertia[0] * (y * gz - z * gy)
+        sample[1] += inertia[1] * (z * gx - x * gz)
+        sample[2] += inertia[2] * (x * gy - y * gx)
+        a.phases[i] = (a.phases[i] + angle) % (2.0 * math.pi)
+    return 0
+
+
+class _Vibration(Acting):
+    STEPS: ClassVar = {"sample": vibrate}
+
+    def __init__(
+        self, p: PropellerVibration, bench: Bench, imbalance: np.ndarray, phases: np.ndarray
+    ) -> None:
+        model, base = bench.model, bench.model.body(BASE).id
+        self.arrays = Shaken(
+            bench.sample,
+            bench.rotors.speed,
+            bench.directions,
+            bench.positions,
+            phases,
+            imbalance,
+            p.blade_passing * bench.vehicle.description.rotor.thrust_coefficient,
+            p.frame_gain / float(model.body_subtreemass[base]),
+            p.frame_gain / model.body_inertia[base],
+            bench.period,
+        )
