@@ -12,7 +12,7 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap, generators, quantised, take_poses
+from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap, generators, quantised, take_pose
 
 VEHICLE = Vehicle.load()
 NUMBERS = VEHICLE.numbers
@@ -73,8 +73,9 @@ def test_mocap_keeps_its_rate_on_average():
     mocap, pose = Mocap(NUMBERS["sensors"]["mocap"], 1.0, generators(1, 2)), np.ones(7)
     exposures = 0
     for k in range(2500):
-        mocap.draw()
-        exposures += take_poses(mocap.arrays, k * 0.004, pose[:3], pose[3:], pose)
+        mocap.draw(0.004)
+        still = np.zeros(3), np.zeros(3)
+        exposures += take_pose(mocap.arrays, k * 0.004, 0.004, pose[:3], pose[3:], *still, pose)
     assert exposures == pytest.approx(1200, abs=1)
 
 

@@ -50,6 +50,7 @@ def flown(one, ticks=60, command=0.6):
 def tick(one, name):
     """Let one effect act before a control period."""
     acting = one.effects.acting[name]
+    one.effects.draw()
     acting.STEPS["tick"](acting.arrays)
 
 
@@ -344,7 +345,6 @@ def test_the_current_loop_s_noise_has_its_size_and_bandwidth_at_every_joint():
     one = plant("servo_noise:torque=0.02/0.01,bandwidth=5")
     noise, states = one.effects.acting["servo_noise"], []
     for _ in range(20000):
-        one.effects.draw()
         tick(one, "servo_noise")
         states.append(noise.arrays.noise.copy())
     states = np.array(states)
