@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from uam_control.laws.asmc1 import Asmc1Law
 from uam_control.laws.asmc2 import Asmc2Law
+from uam_control.laws.geometric import GeometricL1Law, GeometricLaw
+from uam_control.laws.indi import IndiLaw
 from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.modular import ModularLaw
 from uam_control.settings.parameter_set import ParameterError
@@ -14,6 +16,9 @@ LAWS: dict[str, type[Law]] = {
         ModularLaw,
         Asmc1Law,
         Asmc2Law,
+        GeometricLaw,
+        GeometricL1Law,
+        IndiLaw,
     )
 }
 DEFAULT = ModularLaw.kind.law

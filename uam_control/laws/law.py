@@ -72,7 +72,7 @@ class Law:
     step: Callable
 
     def __init__(self, parameters: LawParameters) -> None:
-        axes = len(parameters.inertia)
+        axes, self.parameters = len(parameters.inertia), parameters
         self.names = self.gain_names(axes)
         self._tau, self._no_bias = np.zeros(axes), np.zeros(axes)
         self.adaptation = np.zeros(len(self.names) + self.memory)

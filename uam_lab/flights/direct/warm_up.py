@@ -36,6 +36,8 @@ from uam_sim_bridge.plant.effects import presets
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
 # options of this module as a program; further words are names of laws
+# laws that are compiled beforehand: the paper's baselines; the others at their first flight
+OTHERS = [law for law, one in LAWS.items() if one.profile and law != catalogue.DEFAULT]
 STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
@@ -71,7 +73,7 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
             except BaseException:
                 beside.terminate()
                 raise
-        warm_up(law for law in LAWS if law != catalogue.DEFAULT)
+        warm_up(OTHERS)
 
 
 def prepare_direct(
@@ -146,7 +148,7 @@ if __name__ == "__main__":
         _stand_in()
     else:
         prepare_direct(print, [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT])
-        others = [law for law in LAWS if law != catalogue.DEFAULT and ALL_LAWS in sys.argv]
+        others = [law for law in OTHERS if ALL_LAWS in sys.argv]
         command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up"]
         beside = [subprocess.Popen([*command, law]) for law in others]  # each on a core
         sys.exit(max((one.wait() for one in beside), default=0))
