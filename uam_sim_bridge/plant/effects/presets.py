@@ -104,12 +104,13 @@ def _shown(value: float | list[float]) -> str:
 
 def table() -> str:
     """Return effects, sources and the laboratory's numbers in Markdown: of docs/plant.md."""
-    lines = ["| effect | does | parameters (range: laboratory) | source |", "|---|---|---|---|"]
+    lines = ["| effect | does | parameters (laboratory) | source |", "|---|---|---|---|"]
     for name, values in laboratory().items():
         kind = EFFECTS[name]
         words = "; ".join(
-            f"`{parameter}`: {spec.description} ({spec.allowed.removesuffix(' 1')}: "
-            f"{_shown(values.get(parameter, []))})"
+            f"`{parameter}`: {spec.description} "
+            f"({_shown(values.get(parameter, []))} {spec.unit}".removesuffix(" 1")
+            + ")"
             for parameter, spec in kind.ranges()
         )
         lines.append(f"| `{name}` | {kind.ABOUT} | {words} | {kind.SOURCE} |")
