@@ -81,7 +81,11 @@ class Command:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         parser.set_defaults(run=run)
-        self._add = parser.add_argument
+        self._add, self._parser = parser.add_argument, parser
+
+    def subcommands(self) -> Subcommands:
+        """Return the place of commands below this one, which runs without them, too."""
+        return self._parser.add_subparsers(metavar="<command>", title="commands below it")
 
     def option(
         self, flag: str, metavar: str | tuple[str, ...], text: str, default: Any = None, **how: Any
@@ -90,6 +94,10 @@ class Command:
         if default not in (None, ""):
             text = f"{text} (default %(default)s)".strip()
         self._add(flag, metavar=metavar, help=text, default=default, **how)
+
+    def argument(self, name: str, metavar: str, text: str, **how: Any) -> None:
+        """Add an argument without a flag."""
+        self._add(name, metavar=metavar, help=text, **how)
 
     def repeated(self, flag: str, metavar: str, text: str, **how: Any) -> None:
         """Add an option that may be given several times; its value is a list."""

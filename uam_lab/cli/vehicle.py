@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from uam_control.settings import configuration
+from uam_lab.cli import vehicle_import
 from uam_lab.cli.command import Command, Subcommands
 from uam_lab.cli.fly import fly
 from uam_lab.flights.conclude import command_line
@@ -27,6 +28,7 @@ examples:
   uam vehicle --example > my_lab.yaml        the template of a lab file, with comments
   uam vehicle --config my_lab.yaml           drivers, estimator, mission, controllers, bridge ...
   uam vehicle --config my_lab.yaml --dry-run        all commands computed, none sent, nothing armed
+  uam vehicle import drone.urdf              the files of a vehicle of yours: uam vehicle import -h
   uam vehicle --config my_lab.yaml --systemd | sudo tee /etc/systemd/system/uam-vehicle.service
 
 It names each device that is missing and how to check it, waits, and uses a device that is plugged
@@ -55,6 +57,8 @@ def add(commands: Subcommands) -> None:
     command.switch("--no-report", text, "store_false", dest="report")
     command.switch("--example", "print the template of a lab file, and end")
     command.switch("--systemd", "print the unit that starts this at boot, and end")
+    below = command.subcommands()
+    vehicle_import.add(below)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,0 +1,424 @@
+"""Import of vehicles: what is found equals the file; what contradicts is refused by line."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+from urdf_texts import drone, inertial, joint
+
+from uam_control.settings.configuration import path
+from uam_control.vehicle import load_description
+from uam_lab.cli.parser import parsed, run
+from uam_lab.importing import importer
+from uam_lab.importing.answers import Answers, read_answers
+from uam_lab.importing.source import ImportRefused
+from uam_lab.importing.structure import Chosen
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+
+VEHICLES = {
+    "quad": {},
+    "one joint": {"axes": ("0 1 0",)},
+    "hexa, yaw first": {"count": 6, "axes": ("0 0 1", "0 1 0", "0 1 0"), "mass": 3.0},
+    "coaxial octo, 5 joints": {
+        "count": 8,
+        "coaxial": True,
+        "axes": ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 -1 0"),
+        "mass": 6.0,
+    },
+    "tilted mount": {"mount": "0.3 -0.4 0.7", "axes": ("0 1 0", "1 0 0", "0.6 0.8 0")},
+    "small": {"mass": 0.45, "length": 0.06, "axes": ("1 0 0", "0 1 0")},
+}
+
+
+def write(folder, text, name="mine.urdf"):
+    file = folder / name
+    file.write_text(text)
+    return file
+
+
+def imported(folder, text, name="mine.urdf", chosen=None, answers=None, arm_of=None):
+    file = write(folder, text, name)
+    made = importer.import_vehicle(
+        file, folder / "out", "mine", chosen or Chosen(), answers or Answers(), arm_of
+    )
+    return made, Vehicle.of(made.description).compile(0.0)
+
+
+def posed(model, names, angles):
+    data = mujoco.MjData(model)
+    for name, angle in zip(names, angles, strict=True):
+        data.joint(name).qpos = angle
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return data
+
+
+@pytest.mark.parametrize("what", VEHICLES)
+def test_the_written_vehicle_is_that_of_the_file(tmp_path, what):
+    """Place of the tool and centre of mass of base and arm at random angles, in the base's frame:
+    the file as MuJoCo reads it against the vehicle that is written, without its magnet."""
+    text = drone(**VEHICLES[what])
+    made, model = imported(tmp_path, text)
+    names = made.description.joint_names
+    free = text.replace("</robot>", '<link name="world"/></robot>')
+    floating = (
+        '<joint name="f" type="floating"><parent link="world"/><child link="base_link"/></joint>'
+    )
+    how = '<mujoco><compiler fusestatic="false"/></mujoco>'
+    own = mujoco.MjModel.from_xml_string(free.replace("</robot>", f"{floating}{how}</robot>"))
+    masses = np.where(model.body_rootid == model.body("base").id, model.body_mass, 0.0)
+    masses[model.body("magnet").id] = 0.0
+    assert masses.sum() == pytest.approx(own.body_mass.sum(), rel=1e-6)
+    random = np.random.default_rng(7)
+    for _ in range(5):
+        angles = random.uniform(-1.0, 1.0, len(names))
+        here, there = posed(model, names, angles), posed(own, names, angles)
+        base = here.body("base").xpos
+        tool = there.body("tool0").xpos - there.body("base_link").xpos
+        assert here.body("magnet").xpos - base == pytest.approx(tool, abs=1e-6)
+        centre = masses @ (here.xipos - base) / masses.sum()
+        file_centre = there.subtree_com[1] - there.body("base_link").xpos
+        assert centre == pytest.approx(file_centre, abs=1e-5)
+
+
+@pytest.mark.parametrize("what", VEHICLES)
+def test_it_stands_on_its_feet(tmp_path, what):
+    """Half a second with the motors off and the joints at rest: it neither sinks nor topples."""
+    made, _ = imported(tmp_path, drone(**VEHICLES[what]))
+    plant = MujocoPlant(Vehicle.of(made.description), 0.0, seed=1)
+    rotors, joints = len(made.description.rotors), len(made.description.joints)
+    start = plant.truth()
+    for _ in range(125):
+        plant.step(np.zeros(rotors), np.zeros(joints), False)
+    end = plant.truth()
+    assert end.state[0, 2] == pytest.approx(start.state[0, 2] - 0.005, abs=0.003)
+    assert abs(end.quaternion[0]) > 0.9998
+
+
+def test_rotors_of_a_coaxial_octocopter_turn_against_each_other(tmp_path):
+    made, _ = imported(tmp_path, drone(**VEHICLES["coaxial octo, 5 joints"]))
+    above = {}
+    for rotor in made.description.rotors:
+        above.setdefault(tuple(round(x, 3) for x in rotor.position[:2]), []).append(rotor)
+    assert len(above) == 4
+    for pair in above.values():
+        assert len(pair) == 2 and pair[0].counter_clockwise != pair[1].counter_clockwise
+    top = [max(pair, key=lambda one: one.position[2]) for pair in above.values()]
+    around = sorted(top, key=lambda one: math.atan2(one.position[1], one.position[0]))
+    turns = [one.counter_clockwise for one in around]
+    assert turns in ([True, False] * 2, [False, True] * 2)
+
+
+def test_what_is_not_in_the_file_is_assumed_and_says_so(tmp_path):
+    """Thrust: twice the weight of 1.5 + 4 × 0.01 + 2 × 0.08 + 0.07 kg, by four: 8.68 N."""
+    made, _ = imported(tmp_path, drone())
+    assert made.description.mass == pytest.approx(1.77)
+    rotor = made.description.rotor
+    assert rotor.thrust_max == pytest.approx(2.0 * 1.77 * 9.81 / 4.0, rel=1e-3)
+    text = (tmp_path / "out" / "mine.yaml").read_text()
+    assert "lag_up: 0.01591  # assumed: by the radius" in text
+    assert "range_deg: [-103.13, 108.86], stowed_deg" in text
+    assert "# range_deg from the file" in text
+    assert any(line.startswith("rotors.lag_up") for line in made.missing)
+    assert "missing or assumed:" in (tmp_path / "out" / "mine.txt").read_text()
+
+
+def test_answers_take_the_place_of_assumptions(tmp_path):
+    file = write(tmp_path, "rotors: {thrust_max: 9.0}\nservo: XM430-W350\n", "answers.yaml")
+    answers = Answers(read_answers(file, ["rotors.lag_up=0.04"]))
+    made, _ = imported(tmp_path, drone(), answers=answers)
+    described = made.description
+    assert described.rotor.thrust_max == pytest.approx(9.0, rel=1e-4)
+    assert described.rotor.lag_up == 0.04
+    assert described.servo.stall_torque == 4.1
+    assert "lag_up: 0.04  # asked" in (tmp_path / "out" / "mine.yaml").read_text()
+
+
+def test_a_person_at_the_terminal_is_asked(tmp_path):
+    asked = []
+
+    def ask(what, unit, usual):
+        asked.append((what, unit))
+        return "12.5" if "full thrust" in what else ""
+
+    made, _ = imported(tmp_path, drone(), answers=Answers(ask=ask))
+    assert ("full thrust of one rotor", "N") in asked
+    assert made.description.rotor.thrust_max == pytest.approx(12.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"rotors.thrust": 1}, "rotors.thrust: unknown"),
+        ({"rotors.thrust_max": "much"}, "rotors.thrust_max: 'much': a number above 0"),
+        ({"rotors.curve_factor": 1.5}, "a number above 0, at most 1"),
+        ({"servo": "SG90"}, "servo: unknown"),
+    ],
+)
+def test_a_wrong_answer_is_refused(tmp_path, given, said):
+    with pytest.raises(ImportRefused) as error:
+        imported(tmp_path, drone(), answers=Answers(given))
+    assert said in str(error.value)
+
+
+def line_of(text, part):
+    return text[: text.index(part)].count("\n") + 1
+
+
+FINGERS = (
+    f'<link name="left_finger">{inertial(0.01, 0.02)}</link>\n'
+    f'<link name="right_finger">{inertial(0.01, 0.02)}</link>\n'
+    + joint("finger_left", "arm_1", "left_finger", "0 0.01 -0.12", "prismatic",
+            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>')
+    + "\n"
+    + joint("finger_right", "arm_1", "right_finger", "0 -0.01 -0.12", "prismatic",
+            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>'
+            '<mimic joint="finger_left"/>')
+    + "\n</robot>"
+)  # fmt: skip
+SECOND_ARM = (
+    f'<link name="other">{inertial(0.1, 0.05)}</link>\n'
+    + joint("other_joint", "base_link", "other", "0 0.1 0", "revolute",
+            more='<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>')
+    + "\n</robot>"
+)  # fmt: skip
+POINT, FLAT = (
+    '<inertial><mass value="0.08"/>'
+    f'<inertia ixx="{x}" iyy="{x}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>'
+    for x, z in ((0, 0), (1e-5, 3e-5))
+)
+HOSTILE = {  # what is replaced by what → what is said, and the text in whose line it is
+    "cycle": ('<child link="tool0"/>', '<child link="arm_0"/>', "link 'arm_0' hangs on", '"tool"'),
+    "prismatic": (
+        'name="joint_1" type="revolute"',
+        'name="joint_1" type="prismatic"',
+        "joint 'joint_1': prismatic joint in the arm",
+        'name="joint_1"',
+    ),
+    "planar": ('name="tool" type="fixed"', 'name="tool" type="planer"', "type 'planer'", '"tool"'),
+    "negative mass": ('value="0.08"', 'value="-0.08"', "link 'arm_0': mass -0.08 kg", '"arm_0"'),
+    "no inertia": (inertial(0.08, 0.06), "", "body 'arm_0': no mass", '"arm_0"'),
+    "zero inertia": (inertial(0.08, 0.06), POINT, "is nothing", '"arm_0"'),
+    "impossible inertia": (inertial(0.08, 0.06), FLAT, "inertia must satisfy A + B >= C", '"arm_0"'),
+    "not a number": ('xyz="0.02 0 -0.06"', 'xyz="0.02 nan -0.06"', "3 finite numbers", "joint_0"),
+    "in mm": ('xyz="0.02 0 -0.06"', 'xyz="20 0 -60"', "lengths in mm", '"joint_0"'),
+    "duplicate": ('<link name="tool0"/>', '<link name="arm_0"/>', "is there twice", "tool0"),
+    "unknown link": ('parent link="arm_1"', 'parent link="arm_9"', "'arm_9' is no link", '"tool"'),
+    "two roots": ("</robot>", '<link name="alone"/>\n</robot>', "several roots", ""),
+    "axis": ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "an axis of zeros", '"joint_0"'),
+    "limits": ('lower="-1.8"', 'lower="2.8"', "lower 2.8 is above upper 1.9", '"joint_0"'),
+    "two arms": ("</robot>", SECOND_ARM, "several arms hang on the base", ""),
+    "bomb": ("<robot", '<!DOCTYPE x [<!ENTITY a "b">]>\n<robot', "document type", ""),
+    "no XML": ("</robot>", "", "no XML", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_file_that_contradicts_is_refused_by_line(tmp_path, what):
+    plain, broken, said, where = HOSTILE[what]
+    text = drone()
+    assert plain in text
+    with pytest.raises(ImportRefused) as error:
+        imported(tmp_path, text.replace(plain, broken, 1))
+    message = str(error.value)
+    assert said in message and "\n" not in message
+    if where:
+        assert f"mine.urdf line {line_of(text, where)}" in message
+    assert not (tmp_path / "out" / "mine.yaml").exists()
+
+
+def test_a_base_without_mass_is_refused(tmp_path):
+    text = drone().replace('<mass value="1.5"/>', '<mass value="0"/>').replace("0.01", "0")
+    with pytest.raises(ImportRefused, match="'base_link': no mass|base has no mass"):
+        imported(tmp_path, text)
+
+
+def test_another_file_is_refused_with_the_way_to_a_urdf(tmp_path):
+    with pytest.raises(ImportRefused, match="<sdf>: URDF or MJCF expected; for it: gz sdf"):
+        imported(tmp_path, "<sdf version='1.6'/>")
+    macros = '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="x"/></robot>'
+    with pytest.raises(ImportRefused, match="xacro macros; xacro mine.urdf"):
+        imported(tmp_path, macros)
+
+
+def test_fingers_are_no_joints_of_the_arm(tmp_path):
+    made, model = imported(tmp_path, drone().replace("</robot>", FINGERS))
+    assert made.description.joint_names == ("joint_0", "joint_1")
+    assert made.description.mass == pytest.approx(1.77 + 0.02)
+    assert model.nu == 4 + 2 + 1
+
+
+def test_of_two_arms_one_is_chosen(tmp_path):
+    text = drone().replace("</robot>", SECOND_ARM)
+    made, _ = imported(tmp_path, text, chosen=Chosen(arm="joint_0"))
+    assert made.description.joint_names == ("joint_0", "joint_1")
+    assert made.description.mass == pytest.approx(1.77 + 0.1)  # the other one is part of the base
+
+
+def test_a_base_that_floats_already_stays_one(tmp_path):
+    extra = '<link name="map"/>\n' + joint("float", "map", "base_link", "0 0 1", "floating")
+    made, _ = imported(tmp_path, drone().replace("</robot>", extra + "</robot>"))
+    assert made.found[0].startswith("base: base_link")
+
+
+def test_a_range_beside_zero_gets_a_zero_inside(tmp_path):
+    """0 to 2 rad: the zero moves by 1 rad, the range is then -57.29 to 57.29 deg."""
+    text = drone().replace('lower="-1.8" upper="1.9"', 'lower="0" upper="2"', 1)
+    made, model = imported(tmp_path, text)
+    first = made.description.joints[0]
+    assert (first.low, first.high) == pytest.approx((-1.0, 1.0), abs=1e-3)
+    assert any("0 here is 1 rad of the file" in line for line in made.missing)
+    here = posed(model, made.description.joint_names, (-1.0, 0.0))
+    tool = here.body("magnet").xpos - here.body("base").xpos
+    assert tool == pytest.approx(
+        (0.02, 0.0, -0.06 - 0.24), abs=1e-3
+    )  # 0 of the file: straight down
+
+
+def stl(size):
+    """A tetrahedron."""
+    corners = size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    body = b"".join(
+        struct.pack("<12fH", 0, 0, 0, *(float(x) for i in face for x in corners[i]), 0)
+        for face in faces
+    )
+    return b"\0" * 80 + struct.pack("<I", len(faces)) + body
+
+
+def with_mesh(name):
+    mesh = f'<visual><geometry><mesh filename="{name}"/></geometry></visual></link>'
+    return drone().replace("</link>", mesh, 1)
+
+
+def test_a_mesh_of_a_package_is_found_copied_and_shown_only(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "hull.stl").write_bytes(stl(0.1))
+    _, model = imported(tmp_path, with_mesh("package://drone_description/meshes/hull.stl"))
+    assert model.nmesh == 1
+    geom = int(np.flatnonzero(model.geom_dataid >= 0)[0])
+    assert not model.geom_contype[geom] and not model.geom_conaffinity[geom]
+    assert (tmp_path / "out/meshes/mesh_0_hull.stl").is_file()
+
+
+def test_a_missing_or_strange_mesh_is_named(tmp_path):
+    made, _ = imported(tmp_path, with_mesh("package://x/hull.stl"))
+    assert any("mesh package://x/hull.stl is missing: not shown" in one for one in made.missing)
+    (tmp_path / "hull.dae").write_text("x")
+    made, _ = imported(tmp_path, with_mesh("hull.dae"))
+    assert any("mesh hull.dae is not read" in one for one in made.missing)
+    (tmp_path / "hull.stl").write_bytes(b"no mesh")
+    made, _ = imported(tmp_path, with_mesh("hull.stl"))
+    assert any("hull.stl is no mesh that MuJoCo reads" in one for one in made.missing)
+
+
+def test_a_mesh_in_mm_is_refused(tmp_path):
+    (tmp_path / "hull.stl").write_bytes(stl(100.0))
+    with pytest.raises(ImportRefused, match=r"mine.urdf line \d+: mesh hull.stl is 141.4 m large"):
+        imported(tmp_path, with_mesh("hull.stl"))
+
+
+GAZEBO = """<gazebo><plugin filename="librotors_gazebo_motor_model.so" name="m{i}">
+<linkName>rotor_{i}</linkName><turningDirection>{turn}</turningDirection>
+<timeConstantUp>0.0125</timeConstantUp><timeConstantDown>0.025</timeConstantDown>
+<maxRotVelocity>900</maxRotVelocity><motorConstant>1e-05</motorConstant>
+<momentConstant>0.016</momentConstant></plugin></gazebo>
+"""
+
+
+def test_motors_of_gazebo_are_read(tmp_path):
+    """1e-5 × 900² = 8.1 N."""
+    turns = ("ccw", "cw", "ccw", "cw")
+    plugins = "".join(GAZEBO.format(i=i, turn=turn) for i, turn in enumerate(turns))
+    made, _ = imported(tmp_path, drone().replace("</robot>", plugins + "</robot>"))
+    rotor = made.description.rotor
+    assert rotor.thrust_max == pytest.approx(8.1, rel=1e-4)
+    assert (rotor.moment_ratio, rotor.lag_up, rotor.lag_down) == (0.016, 0.0125, 0.025)
+    turned = tuple(one.counter_clockwise for one in made.description.rotors)
+    assert turned == (True, False, True, False)
+    assert not any(line.startswith("rotors.lag") for line in made.missing)
+
+
+MJCF = """<mujoco><worldbody><body name="x2" pos="0 0 0.1"><freejoint/>
+<geom type="box" size=".1 .1 .03" mass="1.2"/>
+<site name="thrust1" pos="-.14 -.18 .05"/><site name="thrust2" pos="-.14 .18 .05"/>
+<site name="thrust3" pos=".14 .18 .08"/><site name="thrust4" pos=".14 -.18 .08"/>
+<body name="upper" pos="0 0 -.05"><joint name="shoulder" axis="0 1 0" pos="0 0 .01" range="-90 90"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.1" size=".01" mass=".1"/>
+<site name="gripper_tip" pos="0 0 -.12"/></body></body></worldbody>
+<actuator><motor name="a" site="thrust1" gear="0 0 1 0 0 -.02" ctrlrange="0 7"/>
+<motor name="b" site="thrust2" gear="0 0 1 0 0 .02" ctrlrange="0 7"/>
+<motor name="c" site="thrust3" gear="0 0 1 0 0 -.02" ctrlrange="0 7"/>
+<motor name="d" site="thrust4" gear="0 0 1 0 0 .02" ctrlrange="0 7"/></actuator></mujoco>"""
+
+
+def test_an_mjcf_tells_thrust_and_turns_by_its_actuators(tmp_path):
+    """A moment along -z per thrust is that of a counter-clockwise rotor; joint 0.04 m below."""
+    made, model = imported(tmp_path, MJCF, "x2.xml")
+    rotor = made.description.rotor
+    assert rotor.thrust_max == pytest.approx(7.0, rel=1e-4)
+    assert rotor.moment_ratio == 0.02
+    turned = [one.counter_clockwise for one in made.description.rotors]
+    assert turned == [True, False, True, False]
+    here = posed(model, ("shoulder",), (0.0,))
+    assert here.joint("shoulder").xanchor - here.body("base").xpos == pytest.approx((0, 0, -0.04))
+    assert here.body("magnet").xpos - here.body("base").xpos == pytest.approx((0, 0, -0.17))
+
+
+def test_an_error_of_mujoco_names_file_and_line(tmp_path):
+    with pytest.raises(ImportRefused, match=r"x2.xml.*line 2"):
+        imported(tmp_path, MJCF.replace('type="box"', 'type="bax"'), "x2.xml")
+
+
+def test_a_vehicle_of_this_project_comes_back(tmp_path):
+    """The hexacopter's MJCF, whose parts stand in other files: same arm, same mass."""
+    made = importer.import_vehicle(
+        path("vehicle/hexa_arm.xml"), tmp_path, "again", Chosen(), Answers()
+    )
+    ours = load_description("hexa_arm")
+    assert made.description.joint_names == ours.joint_names
+    assert made.description.mass == pytest.approx(ours.mass, abs=1e-3)
+    angles = (0.3, -0.7)
+    tips = []
+    for described in (made.description, ours):
+        here = posed(Vehicle.of(described).compile(0.0), described.joint_names, angles)
+        tips.append(here.body("magnet").xpos - here.body("base").xpos)
+    assert tips[0] == pytest.approx(tips[1], abs=1e-6)
+
+
+def test_a_drone_without_an_arm_gets_that_of_another_vehicle(tmp_path):
+    with pytest.raises(
+        ImportRefused, match="no arm: no revolute joint hangs on 'base_link'; --arm-of"
+    ):
+        imported(tmp_path, drone(arm=False))
+    other = load_description("s500_arm3")
+    made, _ = imported(tmp_path, drone(arm=False), arm_of=other)
+    assert made.description.joint_names == other.joint_names
+    assert made.description.servo == other.servo
+    for mine, theirs in zip(made.description.joints, other.joints, strict=True):
+        assert (mine.low, mine.high) == pytest.approx((theirs.low, theirs.high), abs=1e-3)
+
+
+def test_the_command_refuses_in_one_line_with_status_2(tmp_path, capsys):
+    file = write(tmp_path, drone().replace('value="0.08"', 'value="-0.08"', 1))
+    options = parsed(["vehicle", "import", str(file), "--out", str(tmp_path / "o")])
+    assert run(options) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("uam vehicle: ") and said.count("\n") == 1 and "mine.urdf line" in said
+
+
+def test_the_command_writes_files_and_a_picture_once(tmp_path, capsys):
+    file, out = write(tmp_path, drone()), tmp_path / "o"
+    words = ["vehicle", "import", str(file), "--out", str(out), "--no-questions"]
+    assert run(parsed(words)) == 0
+    told = capsys.readouterr().out
+    assert "arm: 2 joints: joint_0, joint_1" in told and "uam vehicle design" in told
+    assert yaml.safe_load((out / "mine.yaml").read_text())["model"] == "mine.xml"
+    assert run(parsed(words)) == 2
+    assert "exists; --overwrite" in capsys.readouterr().err

@@ -1,0 +1,146 @@
+"""From a description to the folder of a vehicle: MJCF, YAML, picture, and what was assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
+from uam_lab.importing import geometry, hung_arm, mjcf_file, numbers, urdf_file
+from uam_lab.importing.answers import ASSUMED, Answers, Told
+from uam_lab.importing.mjcf_text import MjcfText
+from uam_lab.importing.source import ImportRefused, kind_of, tree
+from uam_lab.importing.standing import Stance, stand
+from uam_lab.importing.structure import Chosen, Parts, find
+from uam_sim_bridge.plant import Vehicle
+
+READERS = {"robot": urdf_file.read, "mujoco": mjcf_file.read}
+XM430 = 3.0  # [N m] stall torque of the servo whose friction parts/world.xml has
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A vehicle that was written: its YAML file, and lines about it for the user."""
+
+    description: VehicleDescription
+    found: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def import_vehicle(
+    file: Path,
+    folder: Path,
+    name: str,
+    chosen: Chosen,
+    answers: Answers,
+    arm_of: VehicleDescription | None = None,
+) -> Imported:
+    """Write the vehicle `name` of a URDF or MJCF to `folder`.
+
+    arm_of: vehicle whose arm hangs below a base without one. Raises ImportRefused; nothing is
+    written then, unless the vehicle that was written contradicts itself.
+    """
+    root = tree(file)
+    source = READERS[kind_of(file, root)](file, root)
+    mount = None if arm_of is None else hung_arm.hang(source, chosen, arm_of)
+    parts = find(source, chosen)
+    if not parts.joints:
+        raise ImportRefused(
+            f"{file}: no arm: no revolute joint hangs on '{parts.model.body(parts.base).name}'; "
+            f"--arm-of {DEFAULT_VEHICLE} hangs that vehicle's below it"
+        )
+    geometry.refuse_far(parts)
+    stance = stand(parts, answers)
+    tree_of_numbers = numbers.document(parts, stance, answers, name, arm_of)
+    stall = tree_of_numbers["servos"]["stall_torque"].value
+    model = MjcfText(parts, stance, folder, stall / XM430).write(name)
+    tree_of_numbers["mass"].value = _mass(model)
+    written = folder / f"{name}.yaml"
+    head = f"# {name}: imported from {file.name} by uam vehicle import. SI units, frames FLU.\n"
+    head += "# Behind each number: where it comes from.\n"
+    written.write_text(head + "".join(lines(tree_of_numbers)), encoding="utf-8")
+    description = load_description(written)
+    Vehicle.of(description).compile(0.0)
+    found = tuple(_found(parts, stance, mount))
+    missing = (*parts.source.notes, *parts.notes, *_assumed(tree_of_numbers, ""))
+    if stance.legs.value:
+        missing += (f"landing gear: {stance.legs}",)
+    text = "\n".join(("found:", *found, "", "missing or assumed:", *missing, ""))
+    (folder / f"{name}.txt").write_text(text, encoding="utf-8")
+    return Imported(description, found, missing)
+
+
+def _mass(model: Path) -> float:
+    """Return the mass [kg] of the vehicle that was written; raise ImportRefused if it is none."""
+    try:
+        compiled = mujoco.MjModel.from_xml_path(str(model))
+    except ValueError as error:
+        raise ImportRefused(f"{model}: {' '.join(str(error).split())}") from None
+    return round(float(compiled.body_subtreemass[compiled.body("base").id]), 5)
+
+
+def lines(values: dict[str, Any], indent: str = "") -> Iterator[str]:
+    """Yield the lines of a YAML file, with the origin of each value behind it."""
+    for key, value in values.items():
+        if isinstance(value, Told):
+            yield f"{indent}{key}: {_text(value.value)}  # {value}\n"
+        elif isinstance(value, dict):
+            yield f"{indent}{key}:\n"
+            yield from lines(value, f"{indent}  ")
+        else:
+            yield f"{indent}{key}:\n"
+            for entry in value:
+                inner = ", ".join(f"{k}: {_text(_plain(v))}" for k, v in entry.items())
+                told = "; ".join(f"{k} {v}" for k, v in entry.items() if isinstance(v, Told))
+                yield f"{indent}  - {{{inner}}}  # {told}\n"
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, Told) else value
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_text, value)) + "]"
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _found(parts: Parts, stance: Stance, mount: Told | None) -> Iterator[str]:
+    """Yield what the import found, in lines."""
+    model = parts.model
+    yield f"base: {model.body(parts.base).name}, {geometry.inertial(parts, 0)[0]:.4g} kg"
+    names = ", ".join(model.joint(joint).name for joint in parts.joints)
+    yield f"arm: {len(parts.joints)} joints: {names}"
+    if mount is not None:
+        yield f"arm of another vehicle: at {mount.value} m ({mount})"
+    yield f"end effector: {parts.tip or 'far end of the last link'}; a magnet hangs there"
+    names = ", ".join(dict.fromkeys(one.name for one in parts.rotors))
+    yield f"rotors: {len(parts.rotors)}: {names}"
+    yield f"feet: {stance.legs}"
+    stowed = ", ".join(f"{one.value:g}" for one in stance.stowed)
+    yield f"stowed: {stowed} deg"
+
+
+def _assumed(values: dict[str, Any], above: str) -> Iterator[str]:
+    """Yield the entries that were assumed, by their names."""
+    for key, value in values.items():
+        name = f"{above}{key}"
+        if isinstance(value, Told):
+            if value.origin == ASSUMED and not above.startswith(("sensors", "variation", "air")):
+                yield f"{name}: {_text(value.value)} ({value})"
+        elif isinstance(value, dict):
+            yield from _assumed(value, f"{name}.")
+        else:
+            told = {str(v) for entry in value for v in entry.values() if isinstance(v, Told)}
+            yield from (f"{name}: {one}" for one in sorted(told) if one.startswith(ASSUMED))
+
+
+def usual_name(file: Path) -> str:
+    """Return the name of a vehicle by its file."""
+    return "".join(c if c.isalnum() else "_" for c in file.stem.lower()).strip("_") or "vehicle"

@@ -1,0 +1,222 @@
+"""The numbers of the vehicle's YAML file, each with its origin."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from uam_control.settings import configuration
+from uam_control.settings.section import read_section
+from uam_control.vehicle import CURRENT_SERVO, DEFAULT_VEHICLE, VehicleDescription
+from uam_lab.importing import geometry, rotors
+from uam_lab.importing.answers import ASSUMED, DERIVED, FILE, Answers, Told
+from uam_lab.importing.source import ImportRefused, RotorFacts
+from uam_lab.importing.standing import Stance
+from uam_lab.importing.structure import Parts
+
+USUAL = f"vehicle/{DEFAULT_VEHICLE}.yaml"  # whose air, sensors, variation and magnet are taken
+GRAVITY = 9.81  # [m/s^2]
+MAGNET_MASS = 0.07  # [kg] of parts/magnet.xml, which the import adds
+Tree = dict[str, Any]  # of Told, trees and lists of trees
+
+
+def servo_types() -> dict[str, dict[str, Any]]:
+    """Return the servos of config/import/servos.yaml, by type."""
+    return read_section(configuration.path("import/servos.yaml"), ImportRefused).values
+
+
+def masses(parts: Parts) -> float:
+    """Return the mass [kg] of all links, without the magnet."""
+    return sum(geometry.inertial(parts, link)[0] for link in range(len(parts.joints) + 1))
+
+
+def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
+    """Return the section `rotors`."""
+    assumed = answers.assumed
+    if not parts.rotors:
+        _lay_out(parts, answers)
+    places = np.array([one.position for one in parts.rotors])
+    turn, stated = rotors.turns(parts.rotors)
+    origin = (FILE, "") if stated else (ASSUMED, "neighbours turn in opposite directions")
+    shown = [one.radius for one in parts.rotors if one.radius > 0.0]
+    gap = rotors.neighbours(places)
+    if shown and max(shown) < 0.75 * gap:
+        radius = Told(float(f"{max(shown):.4g}"), DERIVED, "half width of the rotor's shape")
+    else:
+        radius = answers.number(
+            "rotors.radius", assumed.number("radius_per_gap") * gap, "from neighbours' distance"
+        )
+    r = radius.value
+    weight = mass * GRAVITY
+    ratio = assumed.number("thrust_to_weight")
+    usual = ratio * weight / len(places)
+    thrust = _known(parts, "thrust_max") or answers.number(
+        "rotors.thrust_max", usual, f"{ratio:g} times the weight of {weight:.3g} N"
+    )
+    speed = _known(parts, "speed_max") or Told(
+        float(f"{assumed.number('tip_speed') / r:.4g}"), ASSUMED, "tip speed as of the S-500"
+    )
+    lag = assumed.number("lag_per_radius") * r
+    return {
+        "layout": [
+            {
+                "name": f"rotor_{i + 1}",
+                "position": Told([round(float(x), 4) + 0.0 for x in one.position], FILE, one.name),
+                "direction": Told("ccw" if turn[i] else "cw", *origin),
+            }
+            for i, one in enumerate(parts.rotors)
+        ],
+        "radius": radius,
+        "thrust_coefficient": Told(
+            float(f"{thrust.value / speed.value**2:.5g}"),
+            thrust.origin if thrust.origin != FILE else DERIVED,
+            f"full thrust {thrust.value:g} N {thrust}, at speed_max",
+        ),
+        "speed_max": speed,
+        "curve_factor": answers.number(
+            "rotors.curve_factor", assumed.number("curve_factor"), "as of the S-500", 1.0
+        ),
+        "moment_ratio": _known(parts, "moment_ratio")
+        or answers.number(
+            "rotors.moment_ratio", assumed.number("moment_per_radius") * r, "by the radius"
+        ),
+        "lag_up": _known(parts, "lag_up") or answers.number("rotors.lag_up", lag, "by the radius"),
+        "lag_down": _known(parts, "lag_down")
+        or answers.number("rotors.lag_down", 2.0 * lag, "twice that of lag_up"),
+        "efficiency": Told([1.0] * len(places), ASSUMED),
+    }
+
+
+def _known(parts: Parts, name: str) -> Told | None:
+    """Return the mean of what the file says of its rotors, None if it says nothing of one."""
+    values = [getattr(one.facts, name) for one in parts.rotors]
+    if not values or any(value is None for value in values):
+        return None
+    if max(values) > 1.05 * min(values):
+        raise ImportRefused(
+            f"{parts.rotors[0].where}: {name} of the rotors is {min(values):g} to {max(values):g}: "
+            "one propeller for all is possible"
+        )
+    return Told(float(f"{np.mean(values):.5g}"), FILE)
+
+
+def _lay_out(parts: Parts, answers: Answers) -> None:
+    """Place rotors by a layout: the file has none."""
+    assumed = answers.assumed
+    layouts = assumed.mapping("layouts")
+    usual = assumed.text("layout")
+    told = answers.name("rotors.layout", usual, "the file has no rotors", layouts)
+    chosen = assumed.section("layouts").section(told.value)
+    mass, centre, tensor = geometry.inertial(parts, 0)
+    gyration = math.sqrt(tensor[2, 2] / mass)
+    distance = answers.number(
+        "rotors.distance", assumed.number("arm_per_gyration") * gyration, "from the base's inertia"
+    )
+    count, levels = chosen.whole("places"), chosen.whole("levels")
+    first = math.radians(chosen.number("first_deg"))
+    where = str(parts.source.file)
+    for i in range(count):
+        angle = first - 2.0 * math.pi * i / count
+        for level in range(levels):
+            position = centre + distance.value * np.array([math.cos(angle), math.sin(angle), 0.0])
+            position[2] = centre[2] - level * assumed.number("level_gap") + 0.02
+            facts = RotorFacts(counter_clockwise=(i + level) % 2 == 0)
+            name = f"layout {told.value}"
+            parts.rotors.append(
+                rotors.FoundRotor(name, where, position, np.array([0.0, 0.0, 1.0]), 0.0, facts)
+            )
+    parts.notes.append(f"rotors: layout {told.value} ({told}), {distance.value:g} m ({distance})")
+
+
+def servos_of(other: VehicleDescription) -> Tree:
+    """Return the section `servos` of the vehicle whose arm was hung."""
+    servos = other.numbers["servos"]
+    return {key: Told(value, DERIVED, f"of {other.name}") for key, value in servos.items()}
+
+
+def servo_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
+    """Return the section `servos`: one type that holds the arm outstretched."""
+    assumed, types = answers.assumed, servo_types()
+    load = MAGNET_MASS + assumed.number("payload_share") * mass
+    need = float(geometry.holding_torques(parts, load, GRAVITY).max())
+    share = assumed.number("servo_share")
+    fitting = [
+        name
+        for name, one in types.items()
+        if share * one["stall_torque"] >= need and one["mode"] == CURRENT_SERVO
+    ]
+    usual = fitting[0] if fitting else list(types)[-1]
+    why = f"the smallest that holds {need:.2f} N m with {share:.0%} of its stall torque"
+    told = answers.name("servo", usual, why, types)
+    if types[told.value]["stall_torque"] < need:
+        name = parts.model.joint(parts.joints[0]).name
+        text = f"outstretched the arm needs {need:.2f} N m, {told.value} has less"
+        parts.notes.append(f"joint {name}: {text}")
+    stall = types[told.value]["stall_torque"]
+    stated = [parts.facts(joint).effort for joint in parts.joints]
+    effort = Told(
+        round(assumed.number("effort_share") * stall, 3), DERIVED, "from the stall torque"
+    )
+    if stated and all(need <= one <= stall for one in stated):
+        effort = Told(min(stated), FILE, "smallest effort limit")
+    usual_servo = read_section(configuration.path(USUAL), ImportRefused).section("servos")
+    found: Tree = {"mode": Told(types[told.value]["mode"], told.origin, f"type {told.value}")}
+    for key in ("stall_torque", "no_load_speed"):
+        found[key] = Told(types[told.value][key], told.origin, f"type {told.value}")
+    found["effort_limit"] = effort
+    for key in ("torque_per_current", "current_unit"):
+        found[key] = Told(types[told.value][key], told.origin, f"type {told.value}")
+    for key in ("position_p_gain", "pwm_limit", "command_latency_ticks"):
+        found[key] = Told(usual_servo.entry(key), ASSUMED, "as of the S-500")
+    return found
+
+
+def document(
+    parts: Parts,
+    stance: Stance,
+    answers: Answers,
+    name: str,
+    arm_of: VehicleDescription | None = None,
+) -> Tree:
+    """Return the content of the YAML file; the mass is that of the links and the magnet."""
+    mass = masses(parts) + MAGNET_MASS
+    usual = read_section(configuration.path(USUAL), ImportRefused)
+    servos = servo_numbers(parts, answers, mass) if arm_of is None else servos_of(arm_of)
+    drag = [round(mass * one, 3) for one in answers.assumed.numbers("drag_per_mass", 3)]
+    air = {key: Told(value, ASSUMED) for key, value in usual.mapping("air").items()}
+    air["drag"] = Told(drag, ASSUMED, "by the mass")
+    magnet = {key: Told(value, ASSUMED) for key, value in usual.mapping("magnet").items()}
+    magnet["holding_force"] = answers.number(
+        "magnet.holding_force", magnet["holding_force"].value, "as of the S-500"
+    )
+    return {
+        "model": Told(f"{name}.xml", DERIVED),
+        "profiles": {k: Told(v, ASSUMED) for k, v in usual.mapping("profiles").items()},
+        "autopilot": Told(usual.text("autopilot"), ASSUMED, "uam vehicle design makes both"),
+        "control_period": Told(0.004, ASSUMED, "250 Hz"),
+        "mass": Told(mass, FILE, f"sum of the bodies, and the magnet of {MAGNET_MASS:g} kg"),
+        "gravity": Told(GRAVITY, ASSUMED),
+        "rotors": rotor_numbers(parts, answers, mass),
+        "joints": [
+            {
+                "name": parts.model.joint(joint).name,
+                "range_deg": stance.ranges[i],
+                "stowed_deg": stance.stowed[i],
+            }
+            for i, joint in enumerate(parts.joints)
+        ],
+        "servos": servos,
+        "air": air,
+        "sensors": _assumed(usual.mapping("sensors")),
+        "variation": _assumed(usual.mapping("variation")),
+        "magnet": magnet,
+    }
+
+
+def _assumed(values: dict[str, Any]) -> Tree:
+    return {
+        key: _assumed(value) if isinstance(value, dict) else Told(value, ASSUMED)
+        for key, value in values.items()
+    }
