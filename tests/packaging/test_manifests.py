@@ -16,7 +16,7 @@ MANIFESTS = {name: ROOT / "ros/share" / name / "package.xml" for name in OWN}
 # module → key in rosdep/python.yaml of ros/rosdistro; "-pip": not in apt
 KEYS = {
     **{name: f"python3-{name}" for name in ("numpy", "scipy", "numba", "matplotlib", "jinja2")},
-    **{name: f"python3-{name}" for name in ("packaging", "psutil", "rich", "setproctitle")},
+    **{name: f"python3-{name}" for name in ("lxml", "packaging", "psutil", "rich", "setproctitle")},
     **{name: f"python3-{name}-pip" for name in ("mujoco", "pymavlink")},
     "websockets": "python3-websockets",
     "mcap": "mcap-ros2-support",  # there is no key for mcap alone, which this one brings

@@ -205,7 +205,7 @@ HOSTILE = {  # what is replaced by what → what is said, and the text in whose 
     "negative mass": ('value="0.08"', 'value="-0.08"', "link 'arm_0': mass -0.08 kg", '"arm_0"'),
     "no inertia": (inertial(0.08, 0.06), "", "body 'arm_0': no mass", '"arm_0"'),
     "zero inertia": (inertial(0.08, 0.06), POINT, "is nothing", '"arm_0"'),
-    "impossible inertia": (inertial(0.08, 0.06), FLAT, "inertia must satisfy A + B >= C", '"arm_0"'),
+    "impossible inertia": (inertial(0.08, 0.06), FLAT, "must satisfy A + B >= C", '"arm_0"'),
     "not a number": ('xyz="0.02 0 -0.06"', 'xyz="0.02 nan -0.06"', "3 finite numbers", "joint_0"),
     "in mm": ('xyz="0.02 0 -0.06"', 'xyz="20 0 -60"', "lengths in mm", '"joint_0"'),
     "duplicate": ('<link name="tool0"/>', '<link name="arm_0"/>', "is there twice", "tool0"),

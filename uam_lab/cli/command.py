@@ -85,7 +85,8 @@ class Command:
 
     def subcommands(self) -> Subcommands:
         """Return the place of commands below this one, which runs without them, too."""
-        return self._parser.add_subparsers(metavar="<command>", title="commands below it")
+        text = "in place of this one; each has --help"
+        return self._parser.add_subparsers(metavar="<command>", title="further", help=text)
 
     def option(
         self, flag: str, metavar: str | tuple[str, ...], text: str, default: Any = None, **how: Any

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from uam_control.vehicle import load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.cli.command import Command, Subcommands
 from uam_lab.records.results.terminal import say
 
@@ -17,15 +17,16 @@ examples:
   uam vehicle import drone.urdf                          writes drone/: drone.yaml, drone.xml ...
   uam vehicle import drone.urdf --out my --set rotors.thrust_max=8.2 --set servo=XM430-W350
   uam vehicle import drone.urdf --answers answers.yaml   the same from a file
-  uam vehicle import iris.urdf --arm-of s500_arm         a drone without an arm gets one
+  uam vehicle import iris.urdf --arm-of %s         a drone without an arm gets one
   uam vehicle design drone/drone.yaml                    then: gains and profile
   uam fly --vehicle drone/drone.yaml --scenario hover --engine direct
 
 What a description cannot hold is asked at the terminal, taken from --answers and --set, or assumed;
 the YAML file has the origin of each number, drone.txt the list of what is missing. Keys:
 %s
-Servos: %s. docs/your_vehicle.md. Exit status: 0 written, 2 wrong use or a description that is
-refused, by file and line.
+Servos: %s.
+docs/your_vehicle.md. Exit status: 0 written, 2 wrong use or a description that is refused, by file
+and line.
 """
 
 
@@ -43,7 +44,7 @@ def add(commands: Subcommands) -> None:
         "a vehicle from its URDF or MJCF",
         "Find base, arm, end effector, rotors and feet of a URDF or MJCF, ask for what it cannot "
         "hold, and write the files of a vehicle.",
-        EXAMPLES % (keys, ", ".join(servo_types())),
+        EXAMPLES % (DEFAULT_VEHICLE, keys, ", ".join(servo_types())),
     )
     command.argument("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
     command.option("--out", "DIR", "folder of the files (default ./NAME)", type=Path)
