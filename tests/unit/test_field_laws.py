@@ -24,7 +24,9 @@ def update(a_law, e, e_dot, acceleration_d=0.0, saturated=False):
 
 def test_geometric_control_by_hand():
     """2 (0.5 - 4 * 0.2 - 3 * 0.1) = -1.2"""
-    assert update(law(GeometricLaw), 0.2, 0.1, 0.5) == pytest.approx(-1.2)
+    a_law = law(GeometricLaw)
+    assert update(a_law, 0.2, 0.1, 0.5) == pytest.approx(-1.2)
+    assert a_law.adaptation[0] == pytest.approx(1.1)
 
 
 def test_l1_begins_as_geometric_control_and_then_takes_what_the_predictor_missed():

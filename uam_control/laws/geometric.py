@@ -56,11 +56,22 @@ class GeometricL1Parameters(GeometricParameters):
 def geometric_step(
     record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
-    """Write tau (n,); inputs: see `LawInputs`; record: of `LawParameters.record`."""
-    p = record[0]
+    """Write tau (n,), and the norm of the feedback [m/s^2 or rad/s^2] to adaptation (1,).
+
+    inputs: see `LawInputs`; record: of `LawParameters.record`.
+    """
+    adaptation[0] = feed_back(record[0], inputs, tau)
+
+
+@jit
+def feed_back(p: np.record, inputs: LawInputs, tau: np.ndarray) -> float:
+    """Write tau (n,) of geometric control; return the norm of its feedback."""
+    squared = 0.0
     for i in range(len(tau)):
         feedback = p.lambda_1[i] * inputs.e[i] + p.lambda_2[i] * inputs.e_dot[i]
+        squared += feedback * feedback
         tau[i] = p.inertia[i] * (inputs.acceleration_d[i] - feedback)
+    return math.sqrt(squared)
 
 
 @jit
@@ -76,7 +87,7 @@ def geometric_l1_step(
     decay = math.exp(-p.l1_pole * dt)
     span = (1.0 - decay) / p.l1_pole
     keep = math.exp(-p.l1_cutoff * dt)
-    geometric_step(record, inputs, adaptation, tau)
+    feed_back(p, inputs, tau)
     for i in range(n):
         e_dot = inputs.e_dot[i]
         z = adaptation[2 * n + i] - e_dot if begun else 0.0
@@ -93,7 +104,7 @@ def geometric_l1_step(
 
 
 class GeometricLaw(Law):
-    """Geometric tracking control; it adapts nothing."""
+    """Geometric tracking control; it adapts nothing. `adaptation` (1,): norm of the feedback."""
 
     kind = GeometricParameters
     label = "geometric"
@@ -101,7 +112,7 @@ class GeometricLaw(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        return ()
+        return (GainGroup("", ("feedback",)),)
 
     def reset_adaptation(self) -> None:
         """Nothing adapts."""

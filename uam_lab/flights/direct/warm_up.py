@@ -36,7 +36,7 @@ from uam_sim_bridge.plant.effects import presets
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
 # options of this module as a program; further words are names of laws
-# laws that are compiled beforehand: the paper's baselines; the others at their first flight
+# laws whose loop is compiled beforehand: the paper's baselines; the others at their first flight
 OTHERS = [law for law, one in LAWS.items() if one.profile and law != catalogue.DEFAULT]
 STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
@@ -73,7 +73,7 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
             except BaseException:
                 beside.terminate()
                 raise
-        warm_up(OTHERS)
+        warm_up(law for law in LAWS if law != catalogue.DEFAULT)
 
 
 def prepare_direct(
