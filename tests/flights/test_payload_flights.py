@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
+from pathlib import Path
 
 import pytest
 import yaml
@@ -103,6 +105,17 @@ def test_a_payload_is_picked_from_a_table_by_the_scenario_alone(tmp_path):
     ]
     file = tmp_path / "table_pick.yaml"
     file.write_text(yaml.safe_dump(document))
+    a_flight = flight(str(file))
+    a_flight.run()
+    assert grasps(a_flight) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
+
+
+def test_the_trajectory_of_the_page_picks_and_drops(tmp_path):
+    """The CSV file of docs/scenarios.md, with a payload of its usual mass."""
+    page = (Path(__file__).resolve().parents[2] / "docs/scenarios.md").read_text()
+    (rows,) = re.findall(r"^```\n(t,px.*?magnet\n.*?)^```", page, re.M | re.S)
+    file = tmp_path / "pick.csv"
+    file.write_text(rows)
     a_flight = flight(str(file))
     a_flight.run()
     assert grasps(a_flight) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.mission import ScenarioError, load_scenario
+from uam_control.grasp import grasp_windows
+from uam_control.mission import ScenarioError, ScenarioOptions, load_scenario
 from uam_control.mission.scenarios.fitted_spline import (
     CurveSamples,
     Misfit,
@@ -322,8 +323,11 @@ def test_a_long_pause_of_a_dense_file_is_a_pause(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "reason"),
     [
-        ((*SQUARE, "20,0,0,1"), "line 7 column p[xy]: 12 s after line 6, and the smooth curve sw"),
-        (("0,0,0,1", "10,0,0,1", "10.1,.05,0,1", "10.2,.2,0,1", "10.3,.45,0,1"), "line 3 column"),
+        (
+            (*SQUARE, "20,0,.01,1"),
+            "line 7 column p[xy]: 12 s after line 6, and the smooth curve sw",
+        ),
+        (("0,0,0,1", "10,.01,0,1", "10.1,.05,0,1", "10.2,.2,0,1", "10.3,.45,0,1"), "line 3 column"),
     ],
 )
 def test_rows_between_which_the_curve_swings_out_are_refused(tmp_path, rows, reason):
@@ -376,3 +380,73 @@ def test_times_in_ms_of_a_short_race_show_in_its_speed(tmp_path):
     table[:, 0] *= 1e3
     with pytest.raises(ScenarioError, match="3000 s, but never faster than 0.005 m/s.*in seconds"):
         load_scenario(csv_file(tmp_path, "t,px,py,pz", text(table)))
+
+
+PICK = (  # t, x, z, magnet: descent to a pause, pick, climb, way, drop at a pause, way
+    (0, -1, 1.00, 0),
+    (2, -1, 0.94, 0),
+    (2.6, -1, 0.94, 1),
+    (3.2, -1, 0.94, 1),
+    (4.2, -1, 1.00, 1),
+    (8.2, 1, 1.00, 1),
+    (9.2, 1, 1.00, 0),
+    (10.2, 1, 1.00, 0),
+    (12, 0, 1.00, 0),
+)
+
+
+def picked(folder, rows=PICK, name="magnet", options=None):
+    lines = [f"{t},{x},0,{z},{on}" for t, x, z, on in rows]
+    return load_scenario(csv_file(folder, f"t,px,py,pz,{name}", lines), options=options)
+
+
+@pytest.mark.parametrize("name", ["magnet", "gripper"])
+def test_a_trajectory_picks_and_drops(tmp_path, name):
+    scenario = picked(tmp_path, name=name)
+    begin = scenario.trajectory_begins
+    assert scenario.magnet == ((begin + 2.6, True), (begin + 9.2, False))
+    (window,) = grasp_windows(scenario.motions, scenario.magnet)
+    assert window.dip == pytest.approx(0.06)
+    times = np.array([window.descent, window.grip, window.lifted, window.release]) - begin
+    assert times == pytest.approx([0.0, 2.6, 4.2, 9.2])
+    assert window.departure - begin == pytest.approx(10.2)
+    assert scenario.payload_mass == 0.2
+    assert scenario.notes == ()
+
+
+def test_it_picks_later_where_it_is_slowed_down(tmp_path):
+    scenario = picked(tmp_path, options=ScenarioOptions(slowdown=2.0))
+    begin = scenario.trajectory_begins
+    assert scenario.magnet == ((begin + 5.2, True), (begin + 18.4, False))
+    (window,) = grasp_windows(scenario.motions, scenario.magnet)
+    assert window.lifted - begin == pytest.approx(8.4)
+
+
+def test_a_pause_is_a_rest(tmp_path):
+    """Between the rows of a pause the curve stays within 1 mm; the file has no row there."""
+    path = trajectory_of(picked(tmp_path))
+    rows = path.rows(np.linspace(9.3, 10.1, 30), 2)
+    assert np.abs(rows[0, :, :3] - (1.0, 0.0, 1.0)).max() < 1e-3
+    assert np.abs(rows[1, :, :3]).max() < 0.02
+
+
+def test_an_error_behind_a_pause_names_its_line(tmp_path):
+    rows = (*PICK[:-1], (12, 0, -1.0, 0))
+    with pytest.raises(ScenarioError, match=r"line 10.*pz.*below the ground"):
+        picked(tmp_path, rows)
+
+
+def test_a_pick_without_a_descent_is_told(tmp_path):
+    rows = ((0, 0, 1, 0), (2, 1, 1, 1), (4, 2, 1, 0), (6, 3, 1, 0))
+    assert "a pick is judged only with a descent" in picked(tmp_path, rows).notes[0]
+    quiet = tuple((t, x, z, 0) for t, x, z, _ in PICK)
+    assert picked(tmp_path, quiet).magnet == () and picked(tmp_path, quiet).payload_mass == 0.0
+
+
+@pytest.mark.parametrize(
+    ("row", "said"), [((0, -1, 1, 1), "1: 0 expected in the first"), ((0, -1, 1, 0.5), "0 or 1")]
+)
+def test_a_magnet_is_on_or_off(tmp_path, row, said):
+    rows = (row, *PICK[1:]) if row[3] == 1 else (*PICK[:1], (1, -1, 1, 0.5), *PICK[1:])
+    with pytest.raises(ScenarioError, match=said):
+        picked(tmp_path, rows)

@@ -68,7 +68,7 @@ class PayloadWatch:
         self, scenario: Scenario, guidance: Guidance, parameters: MissionParameters
     ) -> None:
         self.memory = record("", "stepped due_from")
-        windows = grasp_windows(scenario.moves, scenario.magnet)
+        windows = grasp_windows(scenario.motions, scenario.magnet)
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
         self.configure(parameters)

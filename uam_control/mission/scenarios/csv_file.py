@@ -8,6 +8,7 @@
 | vx, vy, vz; ax, ay, az | velocity, acceleration [SI, ENU] |
 | dyaw | rate of yaw [rad/s] |
 | alpha_1 .. alpha_n | angles of all joints [rad] |
+| magnet, or gripper | 1: on from this row on, 0: off |
 
 t and the position are required. Agilicious' names p_x, q_w, v_x, a_lin_x ... mean the same; its
 body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
@@ -15,17 +16,22 @@ body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from uam_control.coordinates import YAW, Z, arm_coordinates
+from uam_control.grasp import grasp_windows
 from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.scenarios.environment import usual_load
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 from uam_control.mission.scenarios.open_gaps import worst_swing
+from uam_control.mission.scenarios.rests import between_rests
 from uam_control.mission.scenarios.route import Route
 from uam_control.mission.scenarios.scenario import (
     LONGEST_FILE,
+    Grip,
     Landing,
     Scenario,
     ScenarioError,
@@ -45,15 +51,18 @@ GROUPS = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "yaw": ("yaw",),
     "yaw rate": ("dyaw",),
+    "magnet": ("magnet",),
 }
-AGILICIOUS = {f"{k}_{a}": f"{k}{a}" for k in "pv" for a in AXES}
-AGILICIOUS |= {f"a_lin_{a}": f"a{a}" for a in AXES} | {f"q_{a}": f"q{a}" for a in "wxyz"}
+OTHER_NAMES = {f"{k}_{a}": f"{k}{a}" for k in "pv" for a in AXES}
+OTHER_NAMES |= {"gripper": "magnet"}
+OTHER_NAMES |= {f"a_lin_{a}": f"a{a}" for a in AXES} | {f"q_{a}": f"q{a}" for a in "wxyz"}
 NOT_USED = {f"{k}_{a}" for k in ("w", "a_rot", "jerk", "snap") for a in AXES}
 NOT_USED |= {f"w{a}" for a in AXES} | {f"u_{i}" for i in range(1, 5)}
 OTHER_UNITS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}  # of t [s]
 PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
 LONG, CRAWL, FAR = 600.0, 0.01, 0.1  # [s, m/s, m] a race of 10 m/s, its times in ms, crawls
 LARGEST = 1e6  # [SI] of a position, rate or angle
+SHORTEST_PAUSE, PAUSE_STEP = 0.5, 0.1  # [s] of a pause; between the rows that it gets
 UNIT = 0.02  # largest deviation of a quaternion's norm from 1
 # rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
 FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
@@ -70,6 +79,7 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
     path = _path(table, times, vehicle, notes)
     table.check_speed()
     end = RETURN if options.end == AS_SCENARIO else options.end
+    grip = _grip(table, times, vehicle, notes)
     scenario = Scenario(
         name=file.stem,
         description=f"trajectory from {file.name}",
@@ -78,6 +88,8 @@ def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) 
         landing=Landing(0.0, 0.0),
         route=Route.around(path, end, options),
         notes=tuple(notes),
+        grip=grip,
+        payload_mass=0.0 if grip is None else usual_load(),
     )
     return scenario.begun_at(standing(vehicle.stowed))
 
@@ -91,9 +103,10 @@ class _Table:
         self._table = CsvTable(file, ScenarioError)
         self._written = _names(self._table, joints)
         self._names = list(self._written)
-        self._numbers = np.array(self._table.numbers(self._written.values()))
-        if len(self._numbers) < 2:
-            raise ScenarioError(f"{file}: at least two rows expected, got {len(self._numbers)}")
+        numbers = np.array(self._table.numbers(self._written.values()))
+        if len(numbers) < 2:
+            raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
+        self._numbers, self._rows = self._with_pauses(numbers)
         backward = np.flatnonzero(np.diff(self.times) <= 0.0)
         if len(backward):
             raise self.error(int(backward[0]) + 1, "t", "time does not increase")
@@ -141,7 +154,26 @@ class _Table:
 
     def line(self, row: int) -> int:
         """Return the line of a row, counted from 0."""
-        return self._table.lines[row]
+        return self._table.lines[self._rows[row]]
+
+    def _with_pauses(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rows with more of them in each pause, and the row of the file of each.
+
+        A pause: two rows that differ in time alone, and in the magnet.
+        """
+        where = [i for i, name in enumerate(self._names) if name not in ("t", "magnet")]
+        t = self._names.index("t")
+        rows, of = [numbers[:1]], [0]
+        for i, (one, other) in enumerate(zip(numbers, numbers[1:], strict=False)):
+            if other[t] - one[t] > SHORTEST_PAUSE and np.array_equal(one[where], other[where]):
+                count = math.ceil((other[t] - one[t]) / PAUSE_STEP)
+                inner = np.repeat(one[None], count - 1, axis=0)
+                inner[:, t] = np.linspace(one[t], other[t], count + 1)[1:-1]
+                rows.append(inner)
+                of += [i] * len(inner)
+            rows.append(other[None])
+            of.append(i + 1)
+        return np.vstack(rows), np.array(of)
 
     def header_error(self, text: str) -> ScenarioError:
         """Return the error of the header."""
@@ -162,7 +194,7 @@ def _names(table: CsvTable, joints: int) -> dict[str, str]:
     known = {"t"}.union(*groups.values())
     found: dict[str, str] = {}
     for written in table.header:
-        name = AGILICIOUS.get(written, written)
+        name = OTHER_NAMES.get(written, written)
         if name in found:
             raise refused(f"column {written} is there twice")
         if name in known:
@@ -233,6 +265,39 @@ def _path(
     none = np.zeros((*powers.shape[:2], YAW - Z - 1))  # roll and pitch
     together = (powers, none, heading.coefficients, arm.coefficients)
     return Polynomials(base.knots, np.concatenate(together, axis=2))
+
+
+def _grip(
+    table: _Table, times: np.ndarray, vehicle: VehicleDescription, notes: list[str]
+) -> Grip | None:
+    """Return what the column `magnet` says; None without the column, or if it is never on."""
+    column = table.columns("magnet")
+    if column is None:
+        return None
+    on = column[:, 0]
+    wrong = (on != 0.0) & (on != 1.0)
+    wrong[0] |= on[0] == 1.0
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        text = "0 expected in the first row" if row == 0 else "0 or 1 expected"
+        raise table.error(row, "magnet", f"{on[row]:g}: {text}")
+    if not on.any():
+        return None
+    changes = np.flatnonzero(np.diff(on)) + 1
+    switches = tuple((float(times[row]), bool(on[row])) for row in changes)
+    names = arm_coordinates(len(vehicle.joints))
+    values = dict(zip("xyz", table.columns("position").T, strict=True))
+    values |= {"yaw": _yaw(table)[:, 0]}
+    if (angles := table.joints(names)) is not None:
+        values |= dict(zip(names, angles.T, strict=True))
+    rests = between_rests(times, values)
+    picks = sum(switched for _, switched in switches)
+    if len(grasp_windows(rests, switches)) < picks:
+        notes.append(
+            f"{table.file.name}: a pick is judged only with a descent to a pause before the magnet "
+            "is on, and a climb after it"
+        )
+    return Grip(switches, rests)
 
 
 def _check_gaps(

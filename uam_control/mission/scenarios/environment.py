@@ -34,6 +34,11 @@ def default_environment() -> tuple[dict[str, Any], ...]:
     return read_environment(top)
 
 
+def usual_load() -> float:
+    """Return the mass [kg] of the payload of `default_environment`."""
+    return next(one["mass"] for one in default_environment() if one["kind"] == PAYLOAD)
+
+
 def material(name: str) -> dict[str, Any]:
     """Return friction (3,) and rgba (4,) of a material."""
     return _catalogue()["materials"][name]

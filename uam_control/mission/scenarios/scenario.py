@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.coordinates import CHI, Z, coordinates
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
-from uam_control.mission.scenarios.route import PAUSE, SINK, Leg, Route
+from uam_control.mission.scenarios.route import PAUSE, SINK, TRAJECTORY, Leg, Route
 from uam_control.mission.scenarios.scenario_options import LAND
 
 LONGEST = 86400.0  # [s] of a flight: more than that are times in another unit
@@ -50,12 +50,37 @@ class Landing:
 
 
 @dataclass(frozen=True)
+class Grip:
+    """Pick and drop along a trajectory, in its own time [s].
+
+    switches: (begin, on) of the magnet; rests: the moves between rests of its coordinates.
+    """
+
+    switches: tuple[tuple[float, bool], ...]
+    rests: tuple[Move, ...]
+
+    def switched(self, begin: float) -> tuple[tuple[float, bool], ...]:
+        """Return the switches of a trajectory that begins at mission time `begin` [s]."""
+        return tuple((begin + at, on) for at, on in self.switches)
+
+    def moves(self, begin: float) -> tuple[Move, ...]:
+        """Return the moves of a trajectory that begins at mission time `begin` [s]."""
+        return tuple(replace(m, start=begin + m.start, end=begin + m.end) for m in self.rests)
+
+    def slowed(self, factor: float) -> Grip:
+        """Return the grip of a trajectory that takes `factor` times as long."""
+        slower = (replace(m, start=factor * m.start, end=factor * m.end) for m in self.rests)
+        return Grip(tuple((factor * at, on) for at, on in self.switches), tuple(slower))
+
+
+@dataclass(frozen=True)
 class Scenario:
     """A flight: moves, a route, or both; phases, magnet switching, landing.
 
     Times are mission times [s]. arm_start: joint angles at take-off [rad]; payload_mass [kg];
     drop_point: x, y [m]; phases, magnet, snapshots: (begin, value). route: without route_at it is
     the whole flight, see `route`; with it, its motion is added to that of the moves from then on.
+    grip: what the magnet does along a route that is the whole flight.
     notes: for the user, about the file. environment: what stands around in simulation, see
     `environment`; (): the usual.
     """
@@ -75,11 +100,22 @@ class Scenario:
     faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
     notes: tuple[str, ...] = ()
     environment: tuple[dict[str, Any], ...] = ()
+    grip: Grip | None = None
 
     @property
     def surroundings(self) -> dict[str, Any]:
         """Return the change of the plant's numbers that this scenario makes."""
         return {"environment": list(self.environment)} if self.environment else {}
+
+    @property
+    def motions(self) -> tuple[Move, ...]:
+        """Return the moves from rest to rest, also those along a route with a grip."""
+        return self.moves if self.grip is None else self.grip.moves(self.trajectory_begins)
+
+    @property
+    def trajectory_begins(self) -> float:
+        """Mission time [s] at which the trajectory of a route begins."""
+        return next(at for at, name in self.phases if name == TRAJECTORY)
 
     def trajectory(self, start: np.ndarray) -> Trajectory:
         """Return the reference from `start` (chi at take-off) to the landing point."""
@@ -111,7 +147,8 @@ class Scenario:
             return self
         route = self.route and self.route.slowed(factor)
         if route is not None and self.route_at is None:
-            return self.along(route)
+            slower = self.grip and self.grip.slowed(factor)
+            return replace(self, grip=slower).along(route)
 
         def later(pairs: tuple) -> tuple:
             return tuple((factor * time, value) for time, value in pairs)
@@ -196,4 +233,7 @@ def routed(scenario: Scenario, legs: tuple[Leg, ...]) -> Scenario:
     begins = np.append(0.0, np.cumsum([leg.path.length for leg in legs])).tolist()
     phases = tuple((begin, leg.phase) for begin, leg in zip(begins, legs, strict=False))
     landing = Landing(begins[-2] + PAUSE, begins[-1] - begins[-2] - PAUSE)
-    return replace(scenario, phases=phases, landing=landing)
+    found = replace(scenario, phases=phases, landing=landing)
+    if scenario.grip is None:
+        return found
+    return replace(found, magnet=scenario.grip.switched(found.trajectory_begins))
