@@ -325,7 +325,7 @@ def test_a_long_pause_of_a_dense_file_is_a_pause(tmp_path):
     [
         (
             (*SQUARE, "20,0,.01,1"),
-            "line 7 column p[xy]: 12 s after line 6, and the smooth curve sw",
+            "line 7 column p[xy]: 12 s after line 6, and the smooth curve",
         ),
         (("0,0,0,1", "10,.01,0,1", "10.1,.05,0,1", "10.2,.2,0,1", "10.3,.45,0,1"), "line 3 column"),
     ],
