@@ -12,6 +12,7 @@ from uam_lab.importing.source import ImportRefused, Source
 
 BELOW = 0.06  # [m] from the centre of mass: where the underside of the base is looked for
 PREFIX = "hung/"
+OPTIONS = tuple(k for k in vars(mujoco.MjOption) if not k.startswith("_"))
 TOP = 0.008  # [m] of the bracket below the origin, of parts/arm_2r.xml and arm_3r.xml
 
 
@@ -28,12 +29,7 @@ def hang(source: Source, chosen: structure.Chosen, vehicle: VehicleDescription) 
     base = source.spec.body(parts.model.body(parts.base).name)
     try:
         other = mujoco.MjSpec.from_file(str(vehicle.model))
-        for key in (
-            "iterations",
-            "impratio",
-            "integrator",
-            "cone",
-        ):  # MuJoCo warns where they differ
+        for key in OPTIONS:  # MuJoCo warns where they differ
             setattr(other.option, key, getattr(source.spec.option, key))
         other.memory = source.spec.memory
         scale = 180.0 / np.pi if other.compiler.degree else 1.0

@@ -18,6 +18,7 @@ from uam_lab.importing.standing import Stance, stand
 from uam_lab.importing.structure import Chosen, Parts, find
 from uam_sim_bridge.plant import Vehicle
 
+SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone
 READERS = {"robot": urdf_file.read, "mujoco": mjcf_file.read}
 XM430 = 3.0  # [N m] stall torque of the servo whose friction parts/world.xml has
 
@@ -66,7 +67,7 @@ def import_vehicle(
     description = load_description(written)
     Vehicle.of(description).compile(0.0)
     found = tuple(_found(parts, stance, mount))
-    missing = (*parts.source.notes, *parts.notes, *_assumed(tree_of_numbers, ""))
+    missing = (*parts.source.notes, *parts.notes, *_assumed(tree_of_numbers))
     if stance.legs.value:
         missing += (f"landing gear: {stance.legs}",)
     text = "\n".join(("found:", *found, "", "missing or assumed:", *missing, ""))
@@ -127,18 +128,22 @@ def _found(parts: Parts, stance: Stance, mount: Told | None) -> Iterator[str]:
     yield f"stowed: {stowed} deg"
 
 
-def _assumed(values: dict[str, Any], above: str) -> Iterator[str]:
-    """Yield the entries that were assumed, by their names."""
+def _assumed(values: dict[str, Any], above: str = "") -> Iterator[str]:
+    """Yield the entries that were assumed, those of a section for one reason together."""
+    together: dict[str, list[str]] = {}
     for key, value in values.items():
-        name = f"{above}{key}"
-        if isinstance(value, Told):
-            if value.origin == ASSUMED and not above.startswith(("sensors", "variation", "air")):
-                yield f"{name}: {_text(value.value)} ({value})"
-        elif isinstance(value, dict):
-            yield from _assumed(value, f"{name}.")
-        else:
-            told = {str(v) for entry in value for v in entry.values() if isinstance(v, Told)}
-            yield from (f"{name}: {one}" for one in sorted(told) if one.startswith(ASSUMED))
+        if isinstance(value, dict):
+            if key not in SMALL:
+                yield from _assumed(value, f"{key}.")
+            continue
+        told = [value] if isinstance(value, Told) else [v for one in value for v in one.values()]
+        for one in told:
+            if isinstance(one, Told) and one.origin == ASSUMED:
+                shown = f"{key}: {_text(one.value)}" if isinstance(value, Told) else key
+                if shown not in together.setdefault(str(one), []):
+                    together[str(one)].append(shown)
+    for why, entries in together.items():
+        yield f"{above}{', '.join(entries)} ({why})"
 
 
 def usual_name(file: Path) -> str:

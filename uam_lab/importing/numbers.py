@@ -162,12 +162,9 @@ def servo_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     if stated and all(need <= one <= stall for one in stated):
         effort = Told(min(stated), FILE, "smallest effort limit")
     usual_servo = read_section(configuration.path(USUAL), ImportRefused).section("servos")
-    found: Tree = {"mode": Told(types[told.value]["mode"], told.origin, f"type {told.value}")}
-    for key in ("stall_torque", "no_load_speed"):
-        found[key] = Told(types[told.value][key], told.origin, f"type {told.value}")
+    which = ", ".join(filter(None, (f"type {told.value}", told.reason)))
+    found: Tree = {k: Told(v, told.origin, which) for k, v in types[told.value].items()}
     found["effort_limit"] = effort
-    for key in ("torque_per_current", "current_unit"):
-        found[key] = Told(types[told.value][key], told.origin, f"type {told.value}")
     for key in ("position_p_gain", "pwm_limit", "command_latency_ticks"):
         found[key] = Told(usual_servo.entry(key), ASSUMED, "as of the S-500")
     return found

@@ -120,6 +120,9 @@ class _Urdf:
         if inertial is None:
             return
         mass, tensor = inertial.find("mass"), inertial.find("inertia")
+        if tensor is None and mass is not None and self._numbers(mass, "value", 1) == [0.0]:
+            link.remove(inertial)  # a frame
+            return
         if mass is None or tensor is None:
             lacks = "mass" if mass is None else "inertia"
             raise self.error(inertial, f"link '{name}': <inertial> without <{lacks}>")
