@@ -12,6 +12,7 @@ from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import load_description
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results import metrics, result_folder
 from uam_lab.records.results.result_folder import ResultFolder
@@ -31,7 +32,7 @@ def made_up_flight(seed=1, scale=1.0, info=None):
     start = np.zeros(8)
     start[2], start[6:] = 0.285, scenario.arm_start
     trajectory = scenario.trajectory(start)
-    recording = FlightTable(len(times), COLUMNS)
+    recording = FlightTable.of(len(times), load_description())
     motion = empty_motion(2)
     reference = motion[:3]
     phase_of_error = noise.uniform(0, 6, 8)

@@ -6,7 +6,8 @@ from nav_msgs.msg import Path
 from rclpy.serialization import deserialize_message
 
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_msgs_py.messages.navigation import path_message
+from uam_control.vehicle import chain_of, load_description
+from uam_msgs_py.messages.navigation import hand_message, path_message
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 1000])
@@ -30,3 +31,15 @@ def test_two_paths_do_not_share_their_bytes():
     first = path_message(1, np.array([5]), np.ones((1, 8)))
     path_message(2, np.array([6]), np.zeros((1, 8)))
     assert deserialize_message(first, Path).poses[0].pose.position.x == 1.0
+
+
+def test_the_pose_of_the_end_effector():
+    chi = np.array([1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2, 0.0, np.pi / 2])
+    message = hand_message(12_000_000_034, chain_of(load_description()), chi)
+    assert message.header.frame_id == "world"
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (12, 34)
+    at, turn = message.pose.position, message.pose.orientation
+    # 0.14 m to the vehicle's front, its left of the world; the magnet's face hangs level
+    assert [at.x, at.y, at.z] == pytest.approx([1.0, 2.14, 3.0 - 0.073 - 0.1 - 0.03])
+    half = np.sqrt(0.5)
+    assert [turn.w, turn.x, turn.y, turn.z] == pytest.approx([half, 0.0, 0.0, half])

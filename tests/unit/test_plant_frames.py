@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 
-from uam_sim_bridge.plant.frames import box, frames, hanging
+from uam_sim_bridge.plant.frames import box, end_effector, frames, hanging
 
 HALF = math.sqrt(0.5)
 MODEL = mujoco.MjModel.from_xml_string("""
@@ -23,6 +23,7 @@ MODEL = mujoco.MjModel.from_xml_string("""
           <joint name="elbow" type="hinge" axis="0 1 0"/>
           <geom size="0.01" mass="0.1"/>
           <body name="hand" pos="0 0 -0.4">
+            <site name="claw" pos="0 0 -0.1" quat="0 0 0 1"/>
             <joint name="wrist" type="hinge" axis="1 0 0"/>
             <geom size="0.01" mass="0.1"/>
           </body>
@@ -32,6 +33,14 @@ MODEL = mujoco.MjModel.from_xml_string("""
   </worldbody>
 </mujoco>
 """)
+
+
+def test_the_end_effector_is_a_site_in_the_frame_of_its_body():
+    (claw,) = end_effector(MODEL, "claw")
+    assert (claw.name, claw.parent, claw.joint) == ("end_effector", "hand", "")
+    np.testing.assert_array_equal(claw.position, [0.0, 0.0, -0.1])
+    np.testing.assert_array_equal(claw.quaternion, [0.0, 0.0, 0.0, 1.0])
+    assert end_effector(MODEL, "") == []
 
 
 def test_frames_parents_first():

@@ -27,9 +27,10 @@ from uam_control.coordinates import (
     Z,
 )
 from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
+from uam_control.maths.rotations import body_rates, matrix_from_euler
 from uam_control.mission.demand import Demand, Excess
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.flatness import attitudes
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.motion.trajectory import Trajectory, reference_rows
 from uam_control.mission.scenarios.ramps import within_room
@@ -317,8 +318,7 @@ class Feasibility:
         drag = np.array(self.vehicle.numbers["air"]["drag"])
         up = np.array([0.0, 0.0, self.vehicle.gravity])
         force = mass[:, None] * (acceleration + up) + drag * velocity
-        angles, rotation = np.empty((len(times), 3)), np.empty((len(times), 3, 3))
-        _attitudes(force, np.ascontiguousarray(rows[CHI, :, YAW]), angles)
+        angles, rotation = attitudes(force, rows[CHI, :, YAW]), np.empty((len(times), 3, 3))
         turning, rates = np.gradient(angles, times, axis=0), np.empty_like(angles)
         turning[:, 2] = rows[CHI_DOT, :, YAW]
         _turns(angles, turning, rates, rotation)
@@ -363,14 +363,6 @@ def _changes(rates: np.ndarray) -> np.ndarray:
     apart = np.abs(rates[2 * TURN :] - rates[: -2 * TURN]).max(axis=1)
     found[TURN : TURN + len(apart)] = apart / (2 * TURN * STEP)
     return found
-
-
-@jit
-def _attitudes(force: np.ndarray, yaw: np.ndarray, angles: np.ndarray) -> None:
-    """Write roll, pitch, yaw [rad] of force (m, 3) [N] and yaw (m,) into angles (m, 3)."""
-    for i in range(len(yaw)):
-        angles[i, 0], angles[i, 1] = thrust_attitude(force[i], yaw[i])
-        angles[i, 2] = yaw[i]
 
 
 @jit

@@ -22,6 +22,7 @@ from uam_control.mission import (
     Scenario,
     StartParameters,
 )
+from uam_control.mission.motion.flyer import Flyer
 from uam_control.nodes.described import described_scenario, described_vehicle
 from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
@@ -45,7 +46,7 @@ from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
-from uam_msgs_py.messages.navigation import path_message
+from uam_msgs_py.messages.navigation import hand_message, path_message
 from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import (
     ERROR,
@@ -67,6 +68,7 @@ AXES = 3  # of position and attitude
 STATUS_PERIOD = 500_000_000  # [ns]
 PATH_STEP = 0.25  # [s] between two poses of the path
 PATH_LENGTH = 250.0  # [s] of the flight in it: a tick must not wait for the path of hours
+HAND_PERIOD = 20_000_000  # [ns] between two references of the end effector
 WATCH_PERIOD = 0.05  # [s] of the watch on states
 
 
@@ -127,6 +129,8 @@ class MissionNode(UamNode):
         self._status = self.publisher(topics.MISSION_STATUS)
         self._preflight = self.publisher(topics.PREFLIGHT)
         self._path = self.publisher(topics.PATH)
+        self._hand = self.publisher(topics.END_EFFECTOR_REFERENCE)
+        self._flyer, self._hand_due = Flyer.with_hand(vehicle), 0  # [ns]
         self._path_of = ""  # the plan that was published, see _publish_path
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
@@ -243,6 +247,11 @@ class MissionNode(UamNode):
         self._reference.publish(
             self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
         )
+        if stage.flying and self._flyer and not 0 <= self._hand_due - stage.ahead <= HAND_PERIOD:
+            self._hand_due = stage.ahead + HAND_PERIOD
+            if self._hand.get_subscription_count():
+                chi = output.reference[CHI]
+                self._hand.publish(hand_message(stage.ahead, self._flyer.chain, chi))
 
     def _publish_status(self, stamp: int) -> None:
         """Publish arming when it changes, and the status when it changes and twice a second."""

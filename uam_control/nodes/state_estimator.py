@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.coordinates import CHI
 from uam_control.estimation import catalogue
 from uam_control.laws.catalogue import DEFAULT
+from uam_control.mission.motion.flyer import Flyer
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
@@ -16,7 +18,7 @@ from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints, read_pose
-from uam_msgs_py.messages.navigation import odometry_message
+from uam_msgs_py.messages.navigation import hand_message, odometry_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
@@ -35,7 +37,9 @@ DIVERGED = "the estimate has diverged: no state for 1 s; look at the rates of IM
 class OdometryParameters(ParameterSet):
     """Rate of nav_msgs/Odometry; fixed once the node runs."""
 
-    odometry_rate: float = number(50.0, "odometry messages per second of stamps", "Hz", 1.0, 1000.0)
+    odometry_rate: float = number(
+        50.0, "odometry and poses of the end effector per second of stamps", "Hz", 1.0, 1000.0
+    )
 
 
 class StateEstimatorNode(UamNode):
@@ -61,6 +65,9 @@ class StateEstimatorNode(UamNode):
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
         self._odometry = self.publisher(topics.ODOMETRY)
+        self._hand = self.publisher(topics.END_EFFECTOR)
+        flyer = Flyer.with_hand(vehicle)
+        self._chain = flyer and flyer.chain
         self._bias = self.publisher(topics.IMU_BIAS)
         self._body = frame(self, topics.BODY)
         self._bias_writer = ImuWriter(self._body)
@@ -112,7 +119,7 @@ class StateEstimatorNode(UamNode):
             self._biases.put(self._bias_writer.fill(stamp, *self._stage.estimator.imu_bias))
         if not 0 <= stamp - self._odometry_at < self._odometry_period:
             self._odometry_at = stamp - stamp % self._odometry_period
-            if self._odometry.get_subscription_count():
+            if any(one.get_subscription_count() for one in (self._odometry, self._hand)):
                 self._to_publish = stamp, state.copy()
         if not self.deferred:
             self.settle()
@@ -140,7 +147,10 @@ class StateEstimatorNode(UamNode):
         for data in self._biases.take():
             self._bias.publish(data)
         if self._to_publish is not None:  # after the state, for which the controllers wait
-            self._odometry.publish(odometry_message(*self._to_publish, self._body))
+            stamp, state = self._to_publish
+            self._odometry.publish(odometry_message(stamp, state, self._body))
+            if self._chain is not None:
+                self._hand.publish(hand_message(stamp, self._chain, state[CHI]))
             self._to_publish = None
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:

@@ -46,6 +46,10 @@ class Section:
         self._asked: dict[str, None] = {}
         self._inner: dict[str, Section] = {}
 
+    def like(self, values: dict[str, Any]) -> Section:
+        """Return a section with other values, and errors of the same place."""
+        return Section(values, self.where, self._error)
+
     def error(self, key: str, text: str) -> ValueError:
         """Return the error that the entry `key` is wrong; text: what is wrong, what is allowed."""
         return self._error(f"{self._name(key)}: {text}")

@@ -1,7 +1,7 @@
 """Node: /tf, URDF, markers and tracking errors, for RViz and Foxglove.
 
     world ─┬─ base_link (estimate) ─┬─ shoulder
-           │                        └─ link_1 ─ link_2 ─ magnet
+           │                        └─ link_1 ─ link_2 ─ magnet ─ end_effector
            ├─ reference (in flight)
            └─ payload (in simulation)
 
@@ -44,7 +44,7 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.frames import box, frames, hanging
+from uam_sim_bridge.plant.frames import Frame, box, end_effector, frames, hanging
 from uam_sim_bridge.plant.urdf import urdf
 from uam_sim_bridge.plant.vehicle import SWING
 
@@ -101,17 +101,17 @@ class SceneNode(UamNode):
         self._markers = self.publisher(topics.MARKERS)
         self._error = self.publisher(topics.TRACKING_ERROR)
         self._error_writer = JointStateWriter(described.coordinates, WORLD)
-        self._describe(urdf(vehicle))
+        self._describe(urdf(vehicle), end_effector(model, described.end_effector))
         self.listen(topics.MISSION_STATUS, self._on_status)
         # other topics are polled when a status arrives or after `wake_up`
         self.triggers = (topics.MISSION_STATUS.name,)
 
-    def _describe(self, robot: str) -> None:
+    def _describe(self, robot: str, hand: list[Frame]) -> None:
         """Publish the constant data: URDF and fixed transforms."""
         self.publisher(topics.ROBOT_DESCRIPTION).publish(String(data=robot))
         still = [
             Transform(0, self._frame(f.parent), self._frame(f.name), f.position, f.quaternion)
-            for f in self._fixed
+            for f in (*self._fixed, *hand)
         ]
         self.publisher(topics.TF_STATIC).publish(transforms_message(still))
 

@@ -77,6 +77,12 @@ CONTENTS = {
         "state_estimator",
         "planners, viewers",
     ),
+    topics.END_EFFECTOR: Content(
+        WORLD, "m, quaternion", "50 Hz with a subscriber", "state_estimator", "planners, viewers"
+    ),
+    topics.END_EFFECTOR_REFERENCE: Content(
+        WORLD, "m, quaternion", "50 Hz with a subscriber", "mission", "planners, viewers"
+    ),
     topics.PATH: Content(
         WORLD, "m", "on change, with a subscriber", "mission", "planners, viewers"
     ),

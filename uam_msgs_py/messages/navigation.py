@@ -9,8 +9,15 @@ from geometry_msgs.msg import Pose, PoseStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.serialization import serialize_message
 
+from uam_control.arm.chain import Chain
+from uam_control.arm.hand import hand_in_world
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT, POSITION
-from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler, rotate_back
+from uam_control.maths.rotations import (
+    matrix_from_euler,
+    quaternion_from_euler,
+    quaternion_from_matrix,
+    rotate_back,
+)
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages.layouts import STAMP
 from uam_msgs_py.messages.ros_time import set_stamp
@@ -30,6 +37,18 @@ def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odomet
     linear, angular = message.twist.twist.linear, message.twist.twist.angular
     linear.x, linear.y, linear.z = rotate_back(to_world, state[CHI_DOT, POSITION].copy()).tolist()
     angular.x, angular.y, angular.z = state[CHI_DOT, ATTITUDE].tolist()
+    return message
+
+
+def hand_message(stamp: int, chain: Chain, chi: np.ndarray) -> PoseStamped:
+    """Return the pose of the end effector at `stamp` [ns] for chi (6 + n,), in the world."""
+    place, turn = hand_in_world(chain, chi)
+    message = PoseStamped()
+    message.header.frame_id = WORLD
+    set_stamp(message.header.stamp, stamp)
+    at, turned = message.pose.position, message.pose.orientation
+    at.x, at.y, at.z = place
+    turned.w, turned.x, turned.y, turned.z = quaternion_from_matrix(np.array(turn)).tolist()
     return message
 
 

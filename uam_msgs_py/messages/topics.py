@@ -205,6 +205,20 @@ PATH = Topic(
     "path", Path, LATCHED, "planned positions of the next 250 s; on change, only with a subscriber",
     recorded=False,
 )  # fmt: skip
+END_EFFECTOR = Topic(
+    "end_effector/pose",
+    PoseStamped,
+    RELIABLE,
+    "the estimate of the end effector, a hanging one straight down; 50 Hz, only with a subscriber",
+    recorded=False,
+)
+END_EFFECTOR_REFERENCE = Topic(
+    "end_effector/reference",
+    PoseStamped,
+    RELIABLE,
+    "the end effector of the reference, in flight; 50 Hz, only with a subscriber",
+    recorded=False,
+)
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic(

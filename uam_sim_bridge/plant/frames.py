@@ -12,6 +12,7 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
+from uam_control.vehicle.chain_reader import FACE
 from uam_sim_bridge.plant.urdf import BASE_LINK, carried
 from uam_sim_bridge.plant.vehicle import BASE
 
@@ -49,6 +50,16 @@ def frames(model: mujoco.MjModel) -> list[Frame]:
     """Return the frames carried by the vehicle's base, parents first."""
     root = model.body(BASE).id
     return [_frame(model, body, root) for body in carried(model)]
+
+
+def end_effector(model: mujoco.MjModel, site: str) -> list[Frame]:
+    """Return the frame of the end effector, a site ("": see `FACE`); [] without one."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site or FACE)
+    if number < 0:
+        return []
+    parent = model.body(model.site_bodyid[number]).name
+    place, turn = model.site_pos[number].copy(), model.site_quat[number].copy()
+    return [Frame("end_effector", parent, place, turn, np.zeros(3))]
 
 
 def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:

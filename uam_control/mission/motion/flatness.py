@@ -14,6 +14,7 @@ import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, JERK, PITCH, ROLL, SNAP, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import thrust_attitude
 
 
 @jit
@@ -86,6 +87,20 @@ def write_attitude(
         reference[CHI_DDOT, i] = min(
             acceleration_max, max(-acceleration_max, reference[CHI_DDOT, i])
         )
+
+
+def attitudes(force: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Return roll, pitch, yaw (m, 3) [rad] of force (m, 3) [N, or per mass] and yaw (m,) [rad]."""
+    angles = np.empty((len(yaw), 3))
+    _write_attitudes(np.ascontiguousarray(force), np.ascontiguousarray(yaw), angles)
+    return angles
+
+
+@jit
+def _write_attitudes(force: np.ndarray, yaw: np.ndarray, angles: np.ndarray) -> None:
+    for i in range(len(yaw)):
+        angles[i, 0], angles[i, 1] = thrust_attitude(force[i], yaw[i])
+        angles[i, 2] = yaw[i]
 
 
 @jit

@@ -67,9 +67,19 @@ def derivatives(
 
 def largest_slope(harmonics: tuple[Harmonic, ...]) -> float:
     """Return the largest |dp / dtheta| [m/rad] of the position."""
+    return float(_slopes(harmonics).max())
+
+
+def lap_length(harmonics: tuple[Harmonic, ...]) -> float:
+    """Return the length [m] of the way of one turn of theta."""
+    return TURN * float(_slopes(harmonics)[:-1].mean())
+
+
+def _slopes(harmonics: tuple[Harmonic, ...]) -> np.ndarray:
+    """Return |dp / dtheta| (721,) [m/rad] of the position along one turn."""
     moving = tuple(h for h in harmonics if h.column < POSITION.stop)
     slope = derivatives(moving, np.linspace(0.0, TURN, 721), 2, POSITION.stop)[1]
-    return float(np.linalg.norm(slope, axis=1).max())
+    return np.linalg.norm(slope, axis=1)
 
 
 def steady(turns: float, period: float, ramp: float) -> Polynomials:

@@ -49,14 +49,18 @@ class CurveSamples(NamedTuple):
 
 
 def fitted(
-    times: np.ndarray, groups: Sequence[CurveSamples], tolerance: float
+    times: np.ndarray,
+    groups: Sequence[CurveSamples],
+    tolerance: float,
+    coarsest: float = COARSEST,
 ) -> list[Polynomials]:
     """Return a spline per group through its values, all with the same knots.
 
-    times (m,) [s], increasing; tolerance: of every value. Raises Misfit.
+    times (m,) [s], increasing; tolerance: of every value; coarsest [s]: largest distance of the
+    knots. Raises Misfit.
     """
     span = float(times[-1] - times[0])
-    step = max(COARSEST, span / (len(times) - 1))
+    step = max(coarsest, span / (len(times) - 1))
     for _ in range(ATTEMPTS):
         knots = _knots(times, max(1, round(span / step)))
         found = [_solved(times, group, knots) for group in groups]

@@ -19,7 +19,7 @@ from uam_control.settings.section import Section
 TANGENT = "tangent"
 DEFAULT_RAMP, RAMP_ACCELERATION = 3.0, 2.0  # [s] shortest, [m/s^2] largest of the default
 SMOOTHSTEP = 35.0 / 16.0  # largest slope of the ramp of the speed, times its mean slope
-TIMINGS = ("period", "speed", "duration")
+TIMINGS = ("period", "speed", "mean_speed", "duration")
 CURVE_KEYS = (
     *("kind", "height", "centre", "rotate_deg", "clockwise", "rise", "laps", "ramp", "sweep"),
     *("yaw", "yaw_deg", "yaw_turns", "arm_deg", "at", *TIMINGS),
@@ -77,10 +77,10 @@ def _curve(entry: Section, kind: str, middle: Middle) -> tuple[Leg, ...]:
     path = curves.follow(shape, theta, pose, tangent, per_lap)
     if ramp == 0.0:
         return (Leg(TRAJECTORY, path),)
-    return _cut(path, ramp)
+    return cut(path, ramp)
 
 
-def _cut(path: Polynomials, ramp: float) -> tuple[Leg, ...]:
+def cut(path: Polynomials, ramp: float) -> tuple[Leg, ...]:
     """Return the ramps of `ramp` [s] at both ends of the path, and the part at speed."""
     knots = path.knots
     ends = [int(np.argmin(np.abs(knots - t))) for t in (ramp, knots[-1] - ramp)]
@@ -168,6 +168,8 @@ def _timing(entry: Section, shape: tuple[Harmonic, ...], laps: float) -> tuple[P
     slope = curves.largest_slope(shape)
     if given[0] == "speed":
         period = curves.TURN * slope / entry.positive("speed")
+    elif given[0] == "mean_speed":
+        period = curves.lap_length(shape) / entry.positive("mean_speed")
     else:
         period = entry.positive("period")
     check_length(laps * period, entry.where)

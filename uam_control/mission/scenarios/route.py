@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -50,17 +50,29 @@ class Leg(NamedTuple):
 Ramp = Callable[[np.ndarray], Polynomials | None]
 
 
+class Source(Protocol):
+    """What legs are made of, where they are not as they were when it is slower."""
+
+    def slowed(self, factor: float) -> Source:
+        """Return it `factor` times as slow."""
+
+    def legs(self) -> tuple[Leg, ...]:
+        """Return its legs."""
+
+
 @dataclass(frozen=True)
 class Route:
     """A trajectory, from rest to rest. legs: run-up, trajectory, run-out; ends: RETURN or LAND.
 
-    ramps_chosen: run-up and run-out are not part of the trajectory, so others may replace them.
+    ramps_chosen: run-up and run-out are not part of the trajectory, so others may replace them;
+    source: of the legs, None if they are slowed down as they are.
     """
 
     legs: tuple[Leg, ...]
     ends: str
     options: ScenarioOptions
     ramps_chosen: bool = False
+    source: Source | None = None
 
     @classmethod
     def around(cls, path: Polynomials, ends: str, options: ScenarioOptions) -> Route:
@@ -78,6 +90,9 @@ class Route:
         """Return the route whose legs take `factor` times as long; for chosen ramps new ones."""
         if self.ramps_chosen:
             return Route.around(self.trajectory.slowed(factor), self.ends, self.options)
+        if self.source is not None:
+            source = self.source.slowed(factor)
+            return replace(self, legs=source.legs(), source=source)
         return replace(
             self, legs=tuple(Leg(leg.phase, leg.path.slowed(factor)) for leg in self.legs)
         )

@@ -12,6 +12,7 @@ import numpy as np
 
 from uam_control.coordinates import BASE_COORDINATES, arm_coordinates
 from uam_control.mission.motion.trajectory import Move
+from uam_control.mission.scenarios import hand_kind
 from uam_control.mission.scenarios.csv_file import from_csv
 from uam_control.mission.scenarios.environment import ENVIRONMENT, read_environment
 from uam_control.mission.scenarios.reference_kinds import Middle, legs
@@ -131,7 +132,11 @@ def _along_route(
     if "at" in entry.values:
         raise entry.error("at", "only with moves and landing")
     start = standing(arm_start)
-    route = Route(legs(entry, _middle(start, vehicle)), end, options)
+    if entry.values.get("kind") == hand_kind.KIND:
+        source = hand_kind.hand_source(entry, vehicle, file.parent)
+        route = Route(source.legs(), end, options, source=source)
+    else:
+        route = Route(legs(entry, _middle(start, vehicle)), end, options)
     scenario = Scenario(
         name=file.stem,
         description=_description(top),

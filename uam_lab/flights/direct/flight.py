@@ -19,7 +19,7 @@ from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.compiled_ticks import CompiledTicks
 from uam_lab.flights.direct.record import TickRecorder
-from uam_lab.records.results.timeseries import FlightTable, columns_of
+from uam_lab.records.results.timeseries import FlightTable
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.autopilot.params import Parameters
@@ -87,7 +87,7 @@ class DirectFlight:
         self._complete = False  # every kind of sensor has delivered
         self.newest: tuple | None = None  # sample of the autopilot's IMU, see `Samples.hil`
         length = scenario.landing.end + 12.0
-        self.recording = FlightTable(int(length / self.plant.period), columns_of(described))
+        self.recording = FlightTable.of(int(length / self.plant.period), described)
         self.recorder = TickRecorder(
             *(self.recording, self.plant.truth_row, self.control, self.autopilot.motors),
             self.plant.period,

@@ -21,6 +21,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
+from uam_control.mission.motion.flyer import Flyer
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_control.vehicle import VehicleDescription, load_description
@@ -132,13 +133,15 @@ def read_flight(
     end = next((stamp for stamp, status in statuses if status.done), None)
     abort_reason = statuses[-1][1].abort_reason if statuses else ""
     simulated = log.width(topics.TRUTH_STATE) > 0
+    vehicle = vehicle or load_description()
     if simulated:
-        columns = timeseries.columns(
-            log.width(topics.TRUTH_STATE) - ALPHA, log.width(topics.TRUTH_ROTORS)
-        )
+        joints = log.width(topics.TRUTH_STATE) - ALPHA
+        flyer = Flyer.with_hand(vehicle) if joints == len(vehicle.joints) else None
+        rotors = log.width(topics.TRUTH_ROTORS)
     else:
-        vehicle = vehicle or load_description()
-        columns = timeseries.columns_of(vehicle)
+        flyer = Flyer.with_hand(vehicle)
+        joints, rotors = len(vehicle.joints), len(vehicle.rotors)
+    columns = timeseries.columns(joints, rotors, flyer is not None)
     states = topics.TRUTH_STATE if simulated else topics.STATE
     references = References(log, columns.size)
     truth = log.samples(states, STATE_ROWS, columns.size)
@@ -159,7 +162,7 @@ def read_flight(
     if len(ticks) < len(every):
         text = f"table and errors have {len(ticks)} of {len(every)} ticks"
         notes.append(f"{text}: the log has no state and no reference of the others (inner_rate)")
-    recording = FlightTable(len(ticks), columns)
+    recording = FlightTable(len(ticks), columns, flyer)
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
     time = values[:, columns["time"]] = (ticks - takeoff) / SECOND

@@ -15,7 +15,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.grasp import Grasp
-from uam_lab.records.results import phase_errors
+from uam_lab.records.results import hand_errors, phase_errors
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 
 # (key, columns of the error block, factor from SI to the unit that the key names)
@@ -106,11 +106,12 @@ def compute(
         "payload_lift_height_m": payload.lift_height_m,
         "payload_place_error_m": payload.place_error_m,
         "landing_error_m": landing,
-        "rms": errors(series, rms),
-        "max": errors(series, largest),
+        "rms": errors(series, rms) | hand_errors.rms(series, series.flown),
+        "max": errors(series, largest) | hand_errors.largest(series, series.flown),
         "position_3d_m": phase_errors.root_mean_square(phase_errors.distance(series, series.flown)),
         "phases": phases,
         "trajectory": next((p for p in phases if p["phase"] == phase_errors.TRAJECTORY), None),
+        "trajectory_with_ramps": phase_errors.with_ramps(series, GROUPS),
         "faults": info.get("faults") or [],
     }
     if info.get("errors_of"):

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import POSITION
+from uam_lab.records.results import hand_errors
 from uam_lab.records.results.timeseries import Series
 
 TRAJECTORY = "trajectory"  # phase of the scenario at its full speed
+WITH_RAMPS = ("run-up", TRAJECTORY, "run-out")
 
 
 def by_phase(series: Series, groups: tuple[tuple[str, slice, float], ...]) -> list[dict[str, Any]]:
@@ -25,6 +27,16 @@ def by_phase(series: Series, groups: tuple[tuple[str, slice, float], ...]) -> li
         for name, mask in masks.items()
         if mask.any()
     ]
+
+
+def with_ramps(
+    series: Series, groups: tuple[tuple[str, slice, float], ...]
+) -> dict[str, Any] | None:
+    """Return the figures of the trajectory and its ramps, None without a trajectory."""
+    rows = series.flown & np.any([series.in_phase(name) for name in WITH_RAMPS], axis=0)
+    if not (series.flown & series.in_phase(TRAJECTORY)).any():
+        return None
+    return figures(series, rows, groups)
 
 
 def distance(series: Series, rows: np.ndarray) -> np.ndarray:
@@ -43,7 +55,8 @@ def figures(
     """Return the figures of the ticks `rows` (ticks,), a mask with one tick or more.
 
     position_3d_m: root mean square of the distance to the reference; largest_3d_m: largest
-    distance; tilt_deg, thrust_n: largest true tilt, and largest sum of the rotors' thrusts.
+    distance; tilt_deg, thrust_n: largest true tilt, and largest sum of the rotors' thrusts; in rms
+    and max: see `hand_errors`.
     """
     error, times = series.block("error.")[rows], series.time[rows]
     away = distance(series, rows)
@@ -61,7 +74,9 @@ def figures(
         "rms": {
             key: (factor * np.sqrt(np.mean(error[:, columns] ** 2, axis=0))).tolist()
             for key, columns, factor in groups
-        },
+        }
+        | hand_errors.rms(series, rows),
+        "max": hand_errors.largest(series, rows),
         "tilt_deg": float(np.degrees(series.tilt[rows].max())),
         "thrust_n": float(np.max(thrust)),
     }

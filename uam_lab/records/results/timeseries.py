@@ -3,7 +3,7 @@
 Both engines write the same table. Metrics, figures and pictures read it by column name. In flight,
 an engine fills a preallocated float64 array by column number:
 
-    recording = FlightTable(ticks, columns_of(vehicle))
+    recording = FlightTable.of(ticks, vehicle)
     truth = recording.columns.block("truth.")
     recording.values[k, truth] = state.ravel()          # state (3, 6 + n): chi, chi_dot, chi_ddot
 
@@ -23,11 +23,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from uam_control.arm.hand import reach
 from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.motion.flyer import Flyer
 from uam_control.vehicle import VehicleDescription
+from uam_lab.records.results import hand_columns
 from uam_lab.records.results.atomic import replacing
+from uam_lab.records.results.hand_columns import TRUTH
 
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
@@ -37,8 +41,8 @@ PHASE_COLUMN = "phase"
 METADATA_KEY = b"uam"
 
 
-def _declare(joints: int, rotors: int) -> dict[str, str]:
-    """Return all numeric columns in file order: name → unit."""
+def _declare(joints: int, rotors: int, hand: bool) -> dict[str, str]:
+    """Return all numeric columns in file order: name → unit; hand: those of an end effector."""
     names = coordinates(joints)
     units = {name: "m" if name in names[POSITION] else "rad" for name in names}
     columns = {"time": "s"}
@@ -61,7 +65,7 @@ def _declare(joints: int, rotors: int) -> dict[str, str]:
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
     columns |= {f"payload.q{axis}": "1" for axis in "wxyz"}
     columns |= {"magnet.on": "1", "magnet.force": "N", "magnet.swing": "rad"}
-    return columns
+    return columns | hand_columns.declared() if hand else columns
 
 
 class Columns:
@@ -113,13 +117,13 @@ class Columns:
 
 
 @cache
-def columns(joints: int, rotors: int) -> Columns:
-    """Return the columns of a vehicle with so many joints and rotors."""
-    return Columns(_declare(joints, rotors))
+def columns(joints: int, rotors: int, hand: bool = False) -> Columns:
+    """Return the columns of a vehicle with so many joints and rotors; hand: an end effector."""
+    return Columns(_declare(joints, rotors, hand))
 
 
 def columns_of(vehicle: VehicleDescription) -> Columns:
-    """Return the columns of a vehicle."""
+    """Return the columns of a vehicle, without those of an end effector."""
     return columns(len(vehicle.joints), len(vehicle.rotors))
 
 
@@ -135,7 +139,16 @@ class UnreadableFlight(ValueError):
 class FlightTable:
     """Preallocated table for recording a flight; unwritten entries are NaN."""
 
-    def __init__(self, capacity: int, columns: Columns):
+    @classmethod
+    def of(cls, capacity: int, vehicle: VehicleDescription) -> FlightTable:
+        """Return a table for a vehicle, with its end effector if it has one."""
+        flyer = Flyer.with_hand(vehicle)
+        joints, rotors = len(vehicle.joints), len(vehicle.rotors)
+        return cls(capacity, columns(joints, rotors, flyer is not None), flyer)
+
+    def __init__(self, capacity: int, columns: Columns, flyer: Flyer | None = None):
+        """flyer: of the end effector, None without."""
+        self._flyer = flyer
         self.columns = columns
         self.values = np.full((capacity, len(columns)), np.nan)
         self.phases = np.zeros(capacity, dtype=np.int8)
@@ -160,15 +173,22 @@ class FlightTable:
         return number
 
     def series(self, info: Mapping[str, Any] | None = None) -> Series:
-        """Return the recorded rows, with error columns and countdown computed."""
+        """Return the recorded rows, with error columns, end effector and countdown computed."""
         values, columns = self.values[: self.count], self.columns
         count_down(values[:, columns["time"]])
         truth, reference = (values[:, columns.block(group)] for group in ("truth.", "reference."))
-        error = truth[:, : columns.size] - reference[:, : columns.size]
+        chi = truth[:, : columns.size]
+        error = chi - reference[:, : columns.size]
         error[:, ANGLES] = wrap_angle(error[:, ANGLES])
         values[:, columns.block("error.")] = error
-        names = tuple(self.phase_names)
-        return Series(values, self.phases[: self.count], names, dict(info or {}), columns)
+        names, told = tuple(self.phase_names), dict(info or {})
+        if self._flyer is not None:
+            rows = reference.reshape(len(values), -1, columns.size).swapaxes(0, 1).copy()
+            swing = values[:, columns["magnet.swing"]]
+            hand = hand_columns.computed(self._flyer, chi, rows, swing)
+            values[:, columns.block(hand_columns.TRUTH)] = hand
+            told["arm_reach_m"] = reach(self._flyer.chain)
+        return Series(values, self.phases[: self.count], names, told, columns)
 
 
 def count_down(time: np.ndarray) -> None:
@@ -301,7 +321,7 @@ def _layout(present: Iterable[str]) -> Columns:
     """Return the columns of a file whose columns are called `present`."""
     joints = sum(label.startswith("error.alpha_") for label in present)
     rotors = sum(label.startswith("rotor_") and ".thrust" in label for label in present)
-    return columns(joints, rotors)
+    return columns(joints, rotors, any(one.startswith(f"{TRUTH}.") for one in present))
 
 
 def _missing(present: Iterable[str], columns: Columns) -> list[str]:

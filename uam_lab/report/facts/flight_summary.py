@@ -134,6 +134,19 @@ def landing_story(metrics: Mapping[str, Any]) -> str:
     return "not landed" if error is None else f"{distance(error)} from the landing point"
 
 
+def hand_story(metrics: Mapping[str, Any]) -> str | None:
+    """Return the error of the end effector, of the trajectory with its ramps if there is one, in
+    one line; None without an end effector."""
+    of = metrics.get("trajectory_with_ramps") or metrics
+    if "end_effector_norm_m" not in of["rms"]:
+        return None
+    rms, most = (of[key]["end_effector_norm_m"] for key in ("rms", "max"))
+    when = "on the trajectory with its ramps" if of is not metrics else "in flight"
+    heading = of["rms"]["end_effector_heading_deg"]
+    text = f"{_number(rms, 1e3, 1)} mm RMS, {_number(most, 1e3, 1)} mm at most"
+    return f"{text}, heading {_number(heading, 1.0, 2)}° RMS, {when}"
+
+
 def supervision_story(metrics: Mapping[str, Any]) -> str | None:
     """Return the interventions of the supervisor, in one line; None without any."""
     steps = [

@@ -19,6 +19,7 @@ from uam_lab.records.results import metrics
 from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
+from uam_lab.report.figures.hand_figures import hand_errors, hand_path
 from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.px4_figure import px4_log
@@ -211,6 +212,12 @@ FIGURES: dict[str, tuple[Callable[[Sequence[DrawnFlight]], Figure | None], str]]
         "Attitude error; the reference of roll and pitch is the desired attitude of tau_p.",
     ),
     "arm_errors": (arm_errors, "Joint error of the arm, truth minus reference."),
+    "end_effector_path": (
+        hand_path,
+        "The end effector from above and from the side, during the trajectory with its ramps if "
+        "there is one.",
+    ),
+    "end_effector_errors": (hand_errors, "Error of the end effector, truth minus reference."),
     "vehicle_inputs": (vehicle_inputs, "Force and torque commands of the two vehicle laws."),
     "arm_inputs": (arm_inputs, "Joint torque commands of the arm law."),
     "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),

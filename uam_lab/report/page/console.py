@@ -99,6 +99,9 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
         table.add_row("layout", metrics["layout"])
     table.add_row("payload", flight_summary.payload_story(metrics))
     table.add_row("landing", flight_summary.landing_story(metrics))
+    hand = flight_summary.hand_story(metrics)
+    if hand:
+        table.add_row("end effector", hand)
     interventions = flight_summary.supervision_story(metrics)
     if interventions:
         table.add_row("supervisor", interventions)

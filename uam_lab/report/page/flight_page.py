@@ -65,6 +65,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         verdict=flight_summary.verdict(metrics),
         payload=flight_summary.payload_story(metrics),
         landing=flight_summary.landing_story(metrics),
+        hand=flight_summary.hand_story(metrics),
         thrust=flight_summary.thrust_story(metrics),
         errors=flight_summary.error_rows(metrics),
         not_compared=flight_summary.not_compared(metrics),

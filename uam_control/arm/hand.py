@@ -1,0 +1,128 @@
+"""The end effector in the world, of a base with any attitude: place, heading, elevation.
+
+Heading: of the horizontal across the tool's y axis; elevation: of its x axis above the horizontal,
+about its y axis (R = Rz(heading) Rx Ry(-elevation)). So both exist however an arm folds; they are
+lost only where the tool's y axis stands upright.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.arm.chain import Chain
+from uam_control.arm.kinematics import hand_jacobian, hand_pose, last_link
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import matrix_from_euler
+from uam_control.maths.vectors import (
+    Rows,
+    Vector,
+    about,
+    dot,
+    plus,
+    product,
+    rows,
+    times,
+    turned,
+    vector,
+)
+
+HAND = X, Y, Z, HEADING, ELEVATION = range(5)  # columns
+STEP = 1e-6  # [rad] of numerical derivatives
+NONE = 1e-9  # relative, of a singular value that counts as zero
+
+
+@jit
+def hand_in_world(chain: Chain, chi: np.ndarray) -> tuple[Vector, Rows]:
+    """Return place [m] and rotation of the end effector in the world; chi (6 + n,).
+
+    A hand on a hinge hangs straight down.
+    """
+    rotation = rows(matrix_from_euler(chi[ATTITUDE]))
+    return _placed(chain, chi, rotation, times(-1.0, rotation[2]))
+
+
+@jit
+def _placed(chain: Chain, chi: np.ndarray, rotation: Rows, down: Vector) -> tuple[Vector, Rows]:
+    """Return what `hand_in_world` does, for a hand that hangs along `down`, in the base frame."""
+    place, turn = hand_pose(chain, chi[ARM], down)
+    return plus(vector(chi[POSITION]), turned(rotation, place)), product(rotation, turn)
+
+
+@jit
+def heading(turn: Rows) -> float:
+    """Return the heading [rad] of a tool with this rotation to the world."""
+    return math.atan2(-turn[0][1], turn[1][1])
+
+
+@jit
+def elevation(turn: Rows) -> float:
+    """Return the elevation [rad] of a tool with this rotation to the world."""
+    return math.atan2(turn[2][0], turn[2][2])
+
+
+@jit
+def _swung(chain: Chain, angles: np.ndarray, swing: float) -> Vector:
+    """Return where down is in the base, for a hand whose hinge stands at `swing` [rad]."""
+    turn = product(last_link(chain, angles)[1], about(vector(chain.swing_axis), swing))
+    load = turned(turn, vector(chain.swing_centre))
+    return times(1.0 / math.sqrt(dot(load, load)), load)
+
+
+@jit
+def _write_hands(chain: Chain, chi: np.ndarray, swing: np.ndarray, found: np.ndarray) -> None:
+    """Write HAND (m, 5) of poses chi (m, 6 + n) with hinges at swing (m,) [rad]; NaN: they hang."""
+    for i in range(len(chi)):
+        rotation = rows(matrix_from_euler(chi[i, ATTITUDE]))
+        down = times(-1.0, rotation[2])
+        if not math.isnan(swing[i]):
+            down = _swung(chain, chi[i, ARM], swing[i])
+        place, turn = _placed(chain, chi[i], rotation, down)
+        for k in range(3):
+            found[i, k] = place[k]
+        found[i, HEADING], found[i, ELEVATION] = heading(turn), elevation(turn)
+
+
+def hands(chain: Chain, chi: np.ndarray, swing: np.ndarray | None = None) -> np.ndarray:
+    """Return HAND (m, 5) [m, rad] of poses chi (m, 6 + n), see `coordinates`.
+
+    swing (m,) [rad]: angle of the hinge of a hand that hangs; NaN, or None: straight down.
+    """
+    found = np.empty((len(chi), len(HAND)))
+    if swing is None or not np.any(chain.swing_axis):
+        swing = np.full(len(chi), np.nan)
+    _write_hands(chain, np.ascontiguousarray(chi), np.ascontiguousarray(swing), found)
+    return found
+
+
+def jacobians(chain: Chain, chi: np.ndarray, columns: list[int]) -> np.ndarray:
+    """Return the derivatives (m, 5, k) of HAND with respect to `columns` of chi (m, 6 + n)."""
+    now, found = hands(chain, chi), []
+    for column in columns:
+        moved = chi.copy()
+        moved[:, column] += STEP
+        change = hands(chain, moved) - now
+        change[:, HEADING:] = np.angle(np.exp(1j * change[:, HEADING:]))
+        found.append(change / STEP)
+    return np.stack(found, axis=2)
+
+
+def stretch(chain: Chain, angles: np.ndarray) -> np.ndarray:
+    """Return the singular values [m/rad], largest first, of the hand's velocity in the base."""
+    jacobian = np.empty((6, len(angles)))
+    hand_jacobian(chain, np.asarray(angles, dtype=float), (0.0, 0.0, -1.0), jacobian)
+    return np.linalg.svd(jacobian[POSITION], compute_uv=False)
+
+
+def freedom(chain: Chain) -> int:
+    """Return in how many directions the hand moves, in a posture without symmetry."""
+    values = stretch(chain, np.sin(np.arange(1.0, len(chain.masses) + 1.0)))
+    return int(np.sum(values > NONE * values[0]))
+
+
+def reach(chain: Chain) -> float:
+    """Return the length [m] of the stretched arm, from the first joint to the end effector."""
+    parts = (*chain.offsets[1:], chain.hand_place, chain.swing_reach)
+    return float(sum(np.linalg.norm(part) for part in parts))

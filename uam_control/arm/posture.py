@@ -1,0 +1,48 @@
+"""A posture in which an arm works well: bent, away from the ends of its joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from uam_control.arm.chain import Chain
+from uam_control.arm.hand import freedom, stretch
+
+STEP = math.radians(5.0)  # of the search
+GAIN = 1e-3  # relative, by which another posture must be better; less does not count
+
+
+def working_posture(
+    chain: Chain, stowed: Sequence[float], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the angles (n,) [rad] within low, high (n,) in which the hand moves best.
+
+    That is the largest product of the singular values of its Jacobian (Yoshikawa's
+    manipulability), found joint by joint from `stowed` on.
+    """
+    angles = np.clip(np.asarray(stowed, dtype=float), low, high)
+    counted = freedom(chain)
+    best = _manipulability(chain, angles, counted)
+    improved = True
+    while improved:
+        improved = False
+        for joint in range(len(angles)):
+            steps = np.arange(
+                math.ceil((low[joint] - angles[joint]) / STEP),
+                math.floor((high[joint] - angles[joint]) / STEP) + 1,
+            )
+            tried = np.repeat(angles[None], len(steps), axis=0)
+            tried[:, joint] += STEP * steps
+            found = [_manipulability(chain, one, counted) for one in tried]
+            if found and max(found) > best * (1.0 + GAIN):
+                good = np.flatnonzero(np.array(found) > max(found) * (1.0 - GAIN))
+                nearest = good[np.argmin(np.abs(steps[good]))]
+                best, angles = found[nearest], tried[nearest]
+                improved = True
+    return angles
+
+
+def _manipulability(chain: Chain, angles: np.ndarray, counted: int) -> float:
+    return float(np.prod(stretch(chain, angles)[:counted]))

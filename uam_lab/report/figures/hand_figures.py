@@ -1,0 +1,66 @@
+"""The end effector: its path against its reference, and its error over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from uam_lab.records.results.hand_columns import ERROR, REFERENCE, TRUTH
+from uam_lab.records.results.phase_errors import WITH_RAMPS
+from uam_lab.records.results.timeseries import Series
+from uam_lab.report.figures import panels, style
+from uam_lab.report.figures.panels import DrawnFlight, Panel, corner_legend, flight_keys
+
+HEIGHT = 3.4  # [in]
+DASHES = (0, (3, 2))  # of the reference
+VIEWS = (("x", "y"), ("x", "z"))  # from above, from the side
+MOST = 3000  # points of a path
+DEGREES = 180.0 / np.pi
+
+
+def hand_errors(flights: Sequence[DrawnFlight]) -> Figure | None:
+    """Draw the error of the end effector over time; return None if a flight has none."""
+    if not _all_have(flights):
+        return None
+    drawn = [Panel(f"{axis} error [mm]", f"{ERROR}.{axis}", 1e3) for axis in "xyz"]
+    drawn.append(Panel("heading error [°]", f"{ERROR}.heading", DEGREES))
+    figure, axes = panels.stack("End effector error", flights, drawn)
+    for axis in axes:
+        axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
+    return figure
+
+
+def hand_path(flights: Sequence[DrawnFlight]) -> Figure | None:
+    """Draw the path of the end effector from above and from the side; None if a flight has none."""
+    if not _all_have(flights):
+        return None
+    figure = Figure(figsize=(style.WIDTH, HEIGHT))
+    axes = figure.subplots(1, len(VIEWS))
+    figure.subplots_adjust(left=0.08, right=0.985, top=0.84, bottom=0.14, wspace=0.24)
+    style.title(figure, "Path of the end effector")
+    for axis, (across, up) in zip(axes, VIEWS, strict=True):
+        for number, flight in enumerate(flights):
+            rows = _shown(flight.series)
+            if number == 0:
+                wanted = (flight.series[f"{REFERENCE}.{one}"][rows] for one in (across, up))
+                axis.plot(*wanted, color=style.REFERENCE, linewidth=1.2, linestyle=DASHES, zorder=6)
+            true = (flight.series[f"{TRUTH}.{one}"][rows] for one in (across, up))
+            axis.plot(*true, color=style.flight_colour(number), linewidth=1.2, zorder=7)
+        axis.set(xlabel=f"{across} [m]", ylabel=f"{up} [m]")
+        axis.set_aspect("equal", adjustable="datalim")
+    reference = style.key("reference", style.REFERENCE, 1.1, DASHES)
+    corner_legend(figure, [reference, *flight_keys(flights)])
+    return figure
+
+
+def _all_have(flights: Sequence[DrawnFlight]) -> bool:
+    return all(f"{ERROR}.x" in flight.series.columns for flight in flights)
+
+
+def _shown(series: Series) -> np.ndarray:
+    """Return the rows of the trajectory with its ramps, without one those of the flight."""
+    ramps = series.flown & np.any([series.in_phase(name) for name in WITH_RAMPS], axis=0)
+    rows = np.flatnonzero(ramps if ramps.any() else series.flown)
+    return rows[:: max(1, len(rows) // MOST)]
