@@ -96,6 +96,7 @@ def test_the_stages_are_those_of_the_block_diagram():
         "mission",
         "position law",
         "attitude law",
+        "hand",
         "arm law",
         "bridge",
         "next reference",
@@ -105,8 +106,8 @@ def test_the_stages_are_those_of_the_block_diagram():
 def test_a_further_stage_comes_before_the_one_named():
     rig, seen = Rig(), []
     rig.control.insert("bridge", "probe", lambda tick: not seen.append(tick.signals.stamp))
-    assert [stage.name for stage in rig.control.stages][5:8] == ["arm law", "probe", "bridge"]
-    assert len(STAGES) == 8
+    assert [stage.name for stage in rig.control.stages][6:9] == ["arm law", "probe", "bridge"]
+    assert len(STAGES) == 9
     rig.tick()
     assert seen == [0]
     with pytest.raises(ValueError, match="nothing"):

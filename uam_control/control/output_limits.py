@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.control.arm_load import ArmLoadParameters
+from uam_control.control.hand_steering import HandParameters
 from uam_control.coordinates import ALPHA, CHI_DOT, PITCH, ROLL, YAW, X, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.maths.compiled import jit
@@ -84,7 +85,7 @@ class TorqueLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class ArmLimits(TorqueLimits, ArmLoadParameters):
+class ArmLimits(TorqueLimits, ArmLoadParameters, HandParameters):
     """Limits of tau_alpha, what is added to it, and what the servos are given."""
 
     integral_gain: tuple = vector(

@@ -101,13 +101,18 @@ class ControllerNode(UamNode):
         self.times.lap(DECODE)
         flying = reference.flying and (position is None or position.flying)
         attitude = () if position is None else (position.attitude,)
-        tau = self.stage.update(stamp, state, reference.values, *attitude, flying)
+        wanted = self.reference_of(state, reference.values, flying)
+        tau = self.stage.update(stamp, state, wanted, *attitude, flying)
         self.times.lap(STAGE)
         self.send(stamp, tau, reference, flying)
         if self.stage.gains_due:
             self._gains.position[:] = self.controller.adaptation
             self._adaptation.publish(self._gains.stamped(stamp))
         self.done_tick(stamp, begun)
+
+    def reference_of(self, state: np.ndarray, reference: np.ndarray, flying: bool) -> np.ndarray:
+        """Return the reference (3, 6 + n) of the law, from that of the mission."""
+        return reference
 
     def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
         """Publish the command of the tick `stamp` [ns]; tau: see `update` of the controller."""

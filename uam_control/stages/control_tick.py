@@ -22,6 +22,7 @@ from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
 from uam_control.stages.autopilot_report import AutopilotReport
 from uam_control.stages.bridge_stage import BridgeStage, sending
 from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.hand_stage import HandStage, hand_step
 from uam_control.stages.law_stages import (
     LawStage,
     MeasuredDelay,
@@ -66,6 +67,7 @@ class ControlTick:
         self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)
         self.measured_delay = MeasuredDelay(self.attitude.controller)
         self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
+        self.hand = HandStage(sets["arm_controller"], timing.control_period, joints, vehicle)
         self.bridge = bridge
         self.laws: dict[str, LawStage] = {
             "position": self.position,
@@ -184,10 +186,17 @@ def control_attitude(tick: ControlTick) -> bool:
     return True
 
 
+def steer_hand(tick: ControlTick) -> bool:
+    """state, reference → reference of the arm law."""
+    s = tick.signals
+    tick.hand.update(s.state, s.reference, s.flying, tick.arm.controller.saturated)
+    return True
+
+
 def control_arm(tick: ControlTick) -> bool:
-    """state, reference, attitude reference → tau_alpha, command of the servos."""
-    s, stage = tick.signals, tick.arm
-    s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
+    """state, reference of `steer_hand`, attitude reference → tau_alpha, command of the servos."""
+    s, stage, reference = tick.signals, tick.arm, tick.hand.arrays.reference
+    s.tau_alpha = stage.update(s.stamp, s.state, reference, s.attitude_reference, s.flying)
     if stage.gains_due:
         tick.mission.inputs.put(GAINS + 2, s.stamp, stage.controller.adaptation)
     return True
@@ -308,6 +317,8 @@ def _law_step(make: Callable[[Callable], Callable], law: str) -> Callable:
         own, inputs = type(stage.controller.law).step, tick.mission.inputs.arrays
         if stage is tick.attitude:
             further = tick.measured_delay.arrays
+        elif stage is tick.arm:
+            further = (tick.hand.arrays.reference,)
         arrays = tick.arrays, stage.controller.arrays, stage.memory, inputs, *further
         return Step(make(own), arrays) if counts_references(own) else None
 
@@ -337,6 +348,10 @@ def _flown(tick: ControlTick) -> tuple:
     return tick.estimator.memory, tick.biases, mission.inputs.arrays, mission.arrays
 
 
+def _steered(tick: ControlTick) -> tuple:
+    return tick.hand.arrays, tick.arm.controller.memory
+
+
 def _ahead(tick: ControlTick) -> tuple:
     return tick.mission.inputs.arrays, tick.mission.arrays
 
@@ -347,6 +362,7 @@ STAGES: Sequence[Stage] = (
     Stage("mission", fly_mission, _step(mission_step, _flown)),
     Stage("position law", control_position, _law_step(position_step, "position"), decides=False),
     Stage("attitude law", control_attitude, _law_step(attitude_step, "attitude"), decides=False),
+    Stage("hand", steer_hand, _step(hand_step, _steered), decides=False),
     Stage("arm law", control_arm, _law_step(arm_step, "arm"), decides=False),
     Stage("bridge", send_setpoint, _bridge_step),
     Stage("next reference", look_ahead, _step(look_ahead_step, _ahead)),

@@ -168,11 +168,11 @@ def arm_step(law: Callable) -> Callable[[tuple], int]:
 
     @borrowing
     def control(a: tuple) -> int:
-        s, r, stage, inputs = a
+        s, r, stage, inputs, reference = a
         dt = step_to(stage, s.numbers[0].stamp)
-        begin_law(r.all, s.state, s.reference, s.attitude_reference, True)
+        begin_law(r.all, s.state, reference, s.attitude_reference, True)
         law(r.all.law.record, given(r.all, dt), r.all.law.adaptation, r.all.law.tau)
-        end_arm(r, s.state, s.reference, dt)
+        end_arm(r, s.state, reference, dt)
         keep_gains(stage, inputs, ARM, s.numbers[0].stamp, r.all.law.adaptation)
         return DONE
 

@@ -43,13 +43,14 @@ KINDS: Mapping[str, Callable[[LocalDelivery], UamNode]] = dict(
     )
 )
 # What of a node runs as a stage of `control_tick.STAGES`. The listeners of the sensors have run
-# when the first node acts.
+# when the first node acts; the hand's stage runs with the arm law.
 ACTS: Mapping[str, tuple[str, str] | None] = {
     "listeners of the sensors": None,
     "estimator": (wiring.ESTIMATOR, "settle"),
     "mission": (wiring.MISSION, "begin_ticks"),
     "position law": (wiring.POSITION, "settle"),
     "attitude law": (wiring.ATTITUDE, "settle"),
+    "hand": None,
     "arm law": (wiring.ARM, "settle"),
     "bridge": (wiring.BRIDGE, "settle"),
     "next reference": (wiring.MISSION, "look_ahead"),

@@ -1,0 +1,157 @@
+"""The arm takes out at the hand what the base leaves: a correction of the arm's reference.
+
+The hand of the reference is compared with that of the present base and of the corrected arm. The
+least change of the joints that closes the difference, by the damped Jacobian (Nakamura and Hanafusa
+1986), is approached with `hand_bandwidth`. Only the commanded angles are used, not the measured
+ones: the arm's own errors stay with its law.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.arm.chain import Chain
+from uam_control.arm.hand import hand_in_world
+from uam_control.arm.kinematics import hand_jacobian
+from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, ROLL, X
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import matrix_from_euler
+from uam_control.maths.vectors import (
+    Vector,
+    cross,
+    dot,
+    minus,
+    rows,
+    times,
+    transposed,
+    turned,
+    vector,
+)
+from uam_control.settings.parameter_set import ParameterSet, number
+
+FADE = 0.5  # [s] in which the correction comes and goes
+RETURN = 4.0  # [rad/s] bandwidth of the way back to the reference, without a bandwidth of its own
+INSIDE = 0.02  # [rad] of a joint's range
+WHOLE, REAL = "has_hand", "bandwidth damping rate_max error_max weight period"
+
+
+@dataclass(frozen=True)
+class HandParameters(ParameterSet):
+    """How the arm stabilises the hand."""
+
+    hand_bandwidth: float = number(
+        0.0, "bandwidth with which the arm keeps the hand where it shall be, 0 = none", "rad/s",
+        0.0, 50.0,
+    )  # fmt: skip
+    hand_damping: float = number(
+        0.01, "damping of the hand's Jacobian, for postures near a singular one", "m/rad", 1e-4, 1.0
+    )
+    hand_joint_rate: float = number(
+        1.0, "largest rate that a joint is given for it", "rad/s", 0.0, 20.0
+    )
+    hand_error_max: float = number(
+        0.1,
+        "error of the hand beyond which the arm gives up until it is below again",
+        "m",
+        0.0,
+        1.0,
+    )
+
+
+class HandArrays(NamedTuple):
+    """chain: of the arm; ranges (2, n) [rad]; correction (2, n): angles [rad] and rates; pose
+    (6 + n,), jacobian (6, n): for the computation; reference (3, 6 + n): of the arm law; numbers
+    (1,): see WHOLE, REAL."""
+
+    chain: Chain
+    ranges: np.ndarray
+    correction: np.ndarray
+    pose: np.ndarray
+    jacobian: np.ndarray
+    reference: np.ndarray
+    numbers: np.ndarray
+
+
+@jit
+def steer(
+    h: HandArrays, state: np.ndarray, reference: np.ndarray, flying: bool, saturated: bool
+) -> None:
+    """Write the reference of the arm law, corrected, to h.reference.
+
+    state, reference: (3, 6 + n), the reference with the attitude that its acceleration needs;
+    saturated: whether a limit changes the torques, so that the correction stays as it is.
+    """
+    m, count = h.numbers[0], h.correction.shape[1]
+    dt = m.period
+    h.reference[:] = reference
+    if m.has_hand == 0 or (m.bandwidth == 0.0 and m.weight == 0.0 and not h.correction[0].any()):
+        return
+    error, away = _error(h, state, reference)
+    wanted = flying and m.bandwidth > 0.0 and away <= m.error_max
+    m.weight = min(1.0, m.weight + dt / FADE) if wanted else max(0.0, m.weight - dt / FADE)
+    if m.weight > 0.0 and away <= m.error_max:
+        goal = _least(h, error, m.damping)
+    else:
+        goal = (0.0, 0.0, 0.0)
+    bandwidth = m.bandwidth if wanted else max(m.bandwidth, RETURN)
+    for i in range(count):
+        target = m.weight * dot(vector(h.jacobian[:3, i]), goal)
+        now, angle = h.correction[0, i], reference[CHI, ALPHA + i]
+        rate = min(m.rate_max, max(-m.rate_max, bandwidth * (target - now)))
+        after = min(h.ranges[1, i] - angle, max(h.ranges[0, i] - angle, now + rate * dt))
+        if saturated and wanted:
+            after = now
+        if not wanted and m.weight == 0.0 and abs(after) < 1e-6:
+            after = 0.0
+        h.correction[0, i], h.correction[1, i] = after, (after - now) / dt
+        h.reference[CHI, ALPHA + i] += after
+        h.reference[CHI_DOT, ALPHA + i] += h.correction[1, i]
+
+
+@jit
+def _error(h: HandArrays, state: np.ndarray, reference: np.ndarray) -> tuple[Vector, float]:
+    """Return where the hand should be from where it is, in the base frame [m], and the distance.
+
+    Writes the Jacobian of the corrected arm.
+    """
+    count = h.correction.shape[1]
+    wanted, _ = hand_in_world(h.chain, reference[CHI])
+    h.pose[:] = state[CHI]
+    for i in range(count):
+        h.pose[ALPHA + i] = reference[CHI, ALPHA + i] + h.correction[0, i]
+    now, _ = hand_in_world(h.chain, h.pose)
+    rotation = rows(matrix_from_euler(state[CHI, ATTITUDE]))
+    hand_jacobian(h.chain, h.pose[ALPHA:], times(-1.0, rotation[2]), h.jacobian)
+    error = turned(transposed(rotation), minus(wanted, now))
+    away = math.sqrt(dot(error, error))
+    return error, away if math.isfinite(away) else math.inf
+
+
+@jit
+def _least(h: HandArrays, error: Vector, damping: float) -> Vector:
+    """Return y, so that J^T y is the least correction that has the hand where it should be.
+
+    (J J^T + damping^2) y = error + J correction, solved by Cramer's rule.
+    """
+    jacobian, count = h.jacobian[X:ROLL], h.correction.shape[1]
+    square = np.zeros((3, 3))
+    goal = np.array(error)
+    for i in range(count):
+        for j in range(3):
+            goal[j] += jacobian[j, i] * h.correction[0, i]
+            for k in range(3):
+                square[j, k] += jacobian[j, i] * jacobian[k, i]
+    for j in range(3):
+        square[j, j] += damping * damping
+    a, b, c = rows(square)
+    g = vector(goal)
+    size = dot(a, cross(b, c))
+    return (
+        dot(g, cross(b, c)) / size,
+        dot(a, cross(g, c)) / size,
+        dot(a, cross(b, g)) / size,
+    )
