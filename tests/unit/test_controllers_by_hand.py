@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planar_arm import planar_arm
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.output_limits import ArmLimits, AttitudeLimits, PositionLimits
@@ -364,7 +365,7 @@ def test_the_measured_loop_delay_beyond_that_of_the_link_is_predicted():
 
 def forward_arm():
     """One link of 1 kg at 1 m, which points forward at rest; gravity 10 m/s^2."""
-    values = {"link_masses": [1.0], "link_centres": [1.0], "link_lengths": [1.0]}
+    values = planar_arm([1.0], [1.0], [1.0])
     state = np.zeros((3, 7))
     state[0, 6] = math.pi / 2.0
     return state, values | {"arm_gravity": 10.0, "arm_feedforward": True}

@@ -20,10 +20,7 @@ from uam_control.mission.feasibility import in_words
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.supervision import Readings
-from uam_control.vehicle import VehicleError, load_description
-from uam_control.vehicle.arm_model import ArmModel
 from uam_lab.flights.flight_settings import settings as flight_settings
-from uam_sim_bridge.plant import Vehicle
 
 PROFILE = load_profile("s500")
 OPEN = replace(
@@ -192,9 +189,9 @@ def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     still = Motion(lambda t: rows(alpha_1=(math.pi / 2, 0, 0)))  # both links horizontal, forward
     demand = checked().along(still, TIMES, np.full(len(TIMES), 0.2))
     # link 1: 0.177 kg at 74.5 mm; link 2: 0.09 kg at 75 mm and the magnet, 0.07 kg, at its pivot,
-    # 140 mm, both 100 mm further; payload at 270 mm from joint 1
-    first = 9.81 * (0.177 * 0.0745 + 0.09 * 0.175 + 0.07 * 0.240 + 0.2 * 0.270)
-    second = 9.81 * (0.09 * 0.075 + 0.07 * 0.140 + 0.2 * 0.170)
+    # 140 mm, both 100 mm further; payload at 240 mm from joint 1
+    first = 9.81 * (0.177 * 0.0745 + 0.09 * 0.175 + 0.07 * 0.240 + 0.2 * 0.240)
+    second = 9.81 * (0.09 * 0.075 + 0.07 * 0.140 + 0.2 * 0.140)
     np.testing.assert_allclose(demand.joint_torques[100], [first, second], rtol=2e-3)
 
 
@@ -208,24 +205,6 @@ def test_the_magnet_must_hold_the_payloads_apparent_weight():
     numbers = PROFILE.vehicle.numbers | {"magnet": {"holding_force": 3.0, "gap_scale": 0.003}}
     weak = Feasibility(replace(PROFILE.vehicle, numbers=numbers), OPEN, 0.2)
     assert "force on the magnet 3.96 N exceeds 3 N" in in_words(weak.exceeded(demand))
-
-
-@pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
-def test_the_arm_model_has_the_masses_of_the_plants_model(name):
-    vehicle = load_description(name)
-    model, arm = Vehicle.of(vehicle).compile(0.0), ArmModel.of(vehicle)
-    first = model.jnt_bodyid[model.joint(vehicle.joint_names[0]).id]
-    assert sum(link.mass for link in arm.links) == pytest.approx(model.body_subtreemass[first])
-    for link, joint in zip(arm.links, vehicle.joint_names, strict=True):
-        np.testing.assert_allclose(link.axis, model.joint(joint).axis)
-        np.testing.assert_allclose(link.offset, model.body(model.joint(joint).bodyid[0]).pos)
-
-
-def test_an_mjcf_of_another_form_is_refused(tmp_path):
-    file = tmp_path / "other.xml"
-    file.write_text("<mujoco><worldbody><body name='base'/></worldbody></mujoco>")
-    with pytest.raises(VehicleError, match="no joint 'alpha_1'"):
-        ArmModel.of(replace(load_description(), model=file))
 
 
 def test_the_refusal_says_what_exceeds_which_limit_and_when():

@@ -11,12 +11,14 @@ import pytest
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
 from uam_control.grasp.evidence import Load, by_mass, by_pose, by_travel, identified_mass
-from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.place_history import PlaceHistory
 from uam_control.grasp.sight import RunningMean
 from uam_control.mission import load_scenario
+from uam_control.vehicle import chain_of, load_description
 
 P = GraspParameters()
+ARM = chain_of(load_description())
 PLACE = np.array([-0.789, 0.0, 0.7675])
 STEP = 0.02
 
@@ -37,12 +39,12 @@ def test_a_flight_without_magnet_has_no_window(name):
 def test_magnet_position_by_hand():
     """(45, 45) deg: 0.1 sin 45 + 0.14 forward, 0.1 cos 45 down; the face hangs 0.03 below."""
     chi = np.array([-1.0, 0.0, 0.94, 0.0, 0.0, 0.0, math.pi / 4, math.pi / 4])
-    at, lever = magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    at, levers = hand_and_levers(ARM, chi)
     down = 0.1 * math.sqrt(0.5)
     assert at == pytest.approx([-1.0 + down + 0.14, 0.0, 0.94 - 0.073 - down - 0.03])
-    assert lever == pytest.approx(down + 0.14)
+    assert levers == pytest.approx([down + 0.14, 0.14])
     chi[5] = math.pi / 2  # heading north: the arm points along y
-    at, _ = magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    at, _ = hand_and_levers(ARM, chi)
     assert at[:2] == pytest.approx([-1.0, down + 0.14])
 
 
@@ -188,7 +190,7 @@ class Flight:
         """The magnet on the path of the scenario."""
         motion = np.zeros((MOTION_ROWS, 8))
         self.path.write(time, motion)
-        return magnet_and_lever(motion[0], (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)[0]
+        return hand_and_levers(ARM, motion[0])[0]
 
     def attempt(self):
         decisions = self.executive.decisions

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
 from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleError, derived_parameters, load_description
+from uam_control.vehicle import VehicleError, chain_of, derived_parameters, load_description
 from uam_control.vehicle.loading import HOVERS, describe
 from uam_lab.analysis import dynamics, supply
 from uam_lab.records.results.timeseries import Series, columns_of
@@ -161,41 +161,20 @@ def test_what_is_missing_is_named(key):
 )
 def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, message):
     numbers = changed(change)
-    del numbers["arm"]  # its number of links would be refused first
     described = describe(numbers, S500.file)
     with pytest.raises(VehicleError) as error:
         MujocoPlant(Vehicle.of(described), 0.0, 1)
     assert message in str(error.value) and "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("arm", "message"),
-    [
-        ({"links": [0.14, 0.1]}, "arm.links: [0.14, 0.1] m, s500_arm.xml has [0.1, 0.14] m"),
-        ({"links": [0.1, 0.1415]}, "arm.links: [0.1, 0.1415] m, s500_arm.xml has"),
-        ({"mount": [0.0, 0.0, 0.073]}, "arm.mount: [0.0, 0.0, 0.073] m, s500_arm.xml has [0, 0, -"),
-        ({"magnet": 0.05}, "arm.magnet: [0.05] m, s500_arm.xml has [0.03] m with all joints at 0"),
-        ({"links": [0.1, 0.1405]}, ""),  # rounded
-    ],
-)
-def test_an_arm_of_other_lengths_than_the_mjcf_is_refused(arm, message):
-    vehicle = Vehicle.of(describe(changed((("arm",), S500.numbers["arm"] | arm)), S500.file))
-    if not message:
-        vehicle.compile(0.0)
-        return
-    with pytest.raises(VehicleError) as error:
-        vehicle.compile(0.0)
-    assert message in str(error.value) and "\n" not in str(error.value)
-
-
 @pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
 def test_the_arm_reaches_as_far_as_in_the_mjcf(name):
     vehicle = Vehicle.load(name)
-    arm, angles = vehicle.description.arm, np.linspace(0.3, 0.8, len(vehicle.description.joints))
+    angles = np.linspace(0.3, 0.8, len(vehicle.description.joints))
     plant = MujocoPlant(vehicle, 0.2, 1, tuple(angles))
     chi = np.concatenate([plant.data.qpos[:3], np.zeros(3), angles])
     face = plant.data.site_xpos[plant.model.site("magnet_face").id]
-    found, _ = magnet_and_lever(chi, arm.mount, arm.links, arm.magnet)
+    found, _ = hand_and_levers(chain_of(vehicle.description), chi)
     assert found == pytest.approx(face, abs=1e-6)
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.control.arm_load import arm_load
+from uam_control.control.arm_load import ArmLoad, arm_load
 from uam_control.control.output_limits import (
     LONGEST_PREDICTION,
     ForceCompletion,
@@ -62,15 +62,14 @@ PREDICTION = "measured ahead prediction nominal"
 
 
 class AttitudeArrays(NamedTuple):
-    """Of the `AttitudeController`. arm, joints (n,): record and torques of `arm_load`, used if
-    `loaded`; inertia [kg m^2]: about pitch; washout, slow (3,): see `wash_out`; prediction (1,):
-    see PREDICTION, and whether the delay counts."""
+    """Of the `AttitudeController`. load, turn (3,) [rad/s^2]: its moment per inertia (3,)
+    [kg m^2]; washout, slow (3,): see `wash_out`; prediction (1,): see PREDICTION, and whether the
+    delay counts."""
 
     all: ControllerArrays
-    arm: np.ndarray
-    joints: np.ndarray
-    loaded: bool
-    inertia: float
+    load: ArmLoad
+    turn: np.ndarray
+    inertia: np.ndarray
     washout: np.ndarray
     slow: np.ndarray
     torque_max: np.ndarray
@@ -78,14 +77,12 @@ class AttitudeArrays(NamedTuple):
 
 
 class ArmArrays(NamedTuple):
-    """Of the `ArmController`. arm, load (n,): record and torques of `arm_load`, used if `loaded`;
-    inertia, gain, limit, integral: see `complete_effort`. command (n,): is given goals if `goals`,
-    of reference or state, plus compliance [rad/(N m)] tau; hold (1,): when, see `is_new`."""
+    """Of the `ArmController`. inertia, gain, limit, integral: see `complete_effort`. command (n,):
+    is given goals if `goals`, of reference or state, plus compliance [rad/(N m)] tau; hold (1,):
+    when, see `is_new`."""
 
     all: ControllerArrays
-    arm: np.ndarray
-    load: np.ndarray
-    loaded: bool
+    load: ArmLoad
     inertia: np.ndarray
     gain: np.ndarray
     limit: float
@@ -121,10 +118,12 @@ def begin_attitude(
 ) -> None:
     """Write the errors of the attitude law: tracking errors, arm's moment, prediction."""
     begin_law(a.all, state, reference, attitude_reference, True)
-    pitch = 0.0
-    if a.loaded:
-        pitch = arm_load(a.arm, reference, a.joints) / a.inertia
-    lead_attitude(a.all.errors, a.prediction[0].ahead, pitch, a.washout, dt, a.slow)
+    if a.load.on:
+        # the law's own inertia, that of vehicle and arm, has the angular acceleration already
+        moment = arm_load(a.load, reference, False)
+        for i in range(3):
+            a.turn[i] = moment[i] / a.inertia[i]
+    lead_attitude(a.all.errors, a.prediction[0].ahead, a.turn, a.washout, dt, a.slow)
 
 
 @jit
@@ -163,10 +162,11 @@ def end_attitude(a: AttitudeArrays) -> None:
 def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Complete the law's torques and limit them; then write goals of the servos if they are due."""
     m, errors, tau = a.all.numbers[0], a.all.errors, a.all.law.tau
-    if a.loaded:
-        arm_load(a.arm, reference, a.load)
+    if a.load.on:
+        arm_load(a.load, reference, True)
     complete_effort(
-        *(errors[FEEDFORWARD, ALPHA:], errors[E, ALPHA:], a.load, a.loaded, a.inertia, a.gain),
+        *(errors[FEEDFORWARD, ALPHA:], errors[E, ALPHA:], a.load.torques, a.load.on, a.inertia),
+        *(a.gain,),
         *(a.limit, m.saturated != 0, dt, a.integral, tau),
     )
     m.saturated = limit_torque(tau, a.torque_max, a.all.tau)

@@ -223,8 +223,7 @@ class AttitudeController(Controller):
         now["prediction"] = p.prediction
         self.measured(now["measured"].item())
         arrays = AttitudeArrays(
-            *(of_all, p.load_record(), np.zeros(len(p.link_masses))),
-            *(bool(p.arm_feedforward), float(p.inertia[1])),
+            *(of_all, p.load(), np.zeros(3), np.array(p.inertia, dtype=float)),
             *(np.array(p.feedforward_washout, dtype=float), self._slow),
             *(np.array(p.torque_max, dtype=float), now),
         )
@@ -274,7 +273,7 @@ class ArmController(Controller):
     def __init__(self, parameters: ArmLimits) -> None:
         joints = len(parameters.inertia)
         self._hold = SampleHold(parameters.goal_rate)
-        self._integral, self._load = np.zeros(joints), np.zeros(joints)
+        self._integral = np.zeros(joints)
         # goals do not exist before the first tick
         to_goals = parameters.setpoint == POSITION_SERVO
         self.command = np.full(joints, np.nan) if to_goals else None
@@ -286,8 +285,8 @@ class ArmController(Controller):
         if not to_goals:
             self.command = self._tau
         arrays = ArmArrays(
-            *(of_all, p.load_record(), self._load, bool(p.arm_feedforward)),
-            *(np.array(p.inertia, dtype=float), np.array(p.integral_gain, dtype=float)),
+            *(of_all, p.load(), np.array(p.inertia, dtype=float)),
+            np.array(p.integral_gain, dtype=float),
             *(float(p.integral_limit), self._integral, np.array(p.torque_max, dtype=float)),
             *(self.command, to_goals, p.goal_from == "reference", float(p.goal_compliance)),
             self._hold.memory,

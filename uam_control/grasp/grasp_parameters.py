@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from uam_control.ages import FORWARDED
-from uam_control.settings.parameter_set import ParameterSet, choice, integer, number, vector
+from uam_control.arm.chain import ChainParameters
+from uam_control.settings.parameter_set import choice, integer, number
 
 
 @dataclass(frozen=True)
-class GraspParameters(ParameterSet):
-    """Attempts, tolerances and times of grasp and release; geometry of the arm to the magnet."""
+class GraspParameters(ChainParameters):
+    """Attempts, tolerances and times of grasp and release, and the arm's numbers."""
 
     grasp_checks: str = choice(
         "on",
@@ -68,15 +69,3 @@ class GraspParameters(ParameterSet):
     payload_age: float = number(
         FORWARDED, "age of the payload's mocap pose above which it is unknown", "s", 0.02, 10.0
     )
-    arm_mount: tuple = vector(
-        (0.0, 0.0, 0.0), "first joint of the arm in the base frame, FLU", "m", -10.0, 10.0, 3
-    )
-    arm_links: tuple = vector(
-        (),
-        "length of each link, the last one to the magnet's pivot",
-        "m",
-        0.001,
-        10.0,
-        optional=True,
-    )
-    magnet_length: float = number(0.0, "pivot of the magnet to its face", "m", 0.0, 1.0)

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import attrgetter
 
 import numpy as np
 
+from uam_control.arm.chain import Chain, carrying
+from uam_control.arm.dynamics import inverse_dynamics
 from uam_control.coordinates import (
     ALPHA,
     ARM,
@@ -28,6 +31,8 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler
+from uam_control.maths.vectors import rows as matrix_rows
+from uam_control.maths.vectors import transposed, turned, vector
 from uam_control.mission.demand import Demand, Excess
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.flatness import attitudes
@@ -37,8 +42,7 @@ from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
 from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
-from uam_control.vehicle import VehicleDescription, VehicleError
-from uam_control.vehicle.arm_model import ArmModel
+from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
 
 STEP = 0.01  # [s] between two checks
 PART = 60000  # checks in one part of a long flight
@@ -54,6 +58,7 @@ DRAGGED = "height while it moves across"
 ACROSS = ("x", "y", "yaw")
 TURN = 2  # steps to both sides, over which a change of the body rates counts: the rate loop's lag
 PRECISION = 1e-3  # of the slowdown, relative
+STILL = 5e-7  # [rad/s] of a joint without friction
 ROOM = 1.002  # by which the slowdown is larger than the least one found
 USED = 0.8  # of thrust, tilt and rates by a run-up that is long enough
 CLEAR = 0.2  # [m] of a ramp from the geofence and the ground
@@ -334,22 +339,37 @@ class Feasibility:
             turning[:, 2],
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
-            *self._arm_loads(times, rows[CHI], rotation, carried),
+            *self._arm_loads(rows, rotation, rates, carried),
         )
 
     def _arm_loads(
-        self, times: np.ndarray, chi: np.ndarray, rotation: np.ndarray, carried: np.ndarray
+        self, rows: np.ndarray, rotation: np.ndarray, rates: np.ndarray, carried: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N]."""
+        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N].
+
+        rows (3, m, 6 + n): the reference; rotation (m, 3, 3), rates (m, 3) [rad/s]: of the base.
+        """
+        count, joints = len(carried), rows.shape[2] - ALPHA
+        if self._chain is None:
+            return np.full((count, joints), np.nan), np.full(count, np.nan)
+        turning, gravity = np.gradient(rates, STEP, axis=0), self.vehicle.gravity
+        motion = np.ascontiguousarray(rows), rotation, rates, turning, gravity
+        torques, push, pull = np.empty((count, joints)), np.empty((count, 3)), np.zeros(count)
+        _arm_torques(self._chain, *motion, torques, push)
+        for mass in np.unique(carried[carried > 0.0]):
+            loaded, more = np.empty_like(torques), np.empty_like(push)
+            _arm_torques(carrying(self._chain, mass), *motion, loaded, more)
+            at = carried == mass
+            torques[at], pull[at] = loaded[at], np.linalg.norm(more - push, axis=1)[at]
+        return torques, pull
+
+    @cached_property
+    def _chain(self) -> Chain | None:
+        """The arm; None for a vehicle of another physics engine, whose model is not MuJoCo's."""
         try:
-            arm = ArmModel.of(self.vehicle)
+            return chain_of(self.vehicle)
         except VehicleError:
-            return np.full((len(times), chi.shape[1] - ALPHA), np.nan), np.full(len(times), np.nan)
-        gravity = self.vehicle.gravity
-        motion = times, chi[:, POSITION], rotation, chi[:, ARM]
-        lift = arm.payload_acceleration(*motion) + np.array([0.0, 0.0, gravity])
-        pull = carried * np.linalg.norm(lift, axis=1)
-        return arm.torques(*motion, gravity, carried), pull
+            return None
 
 
 def in_words(excesses: list[Excess]) -> str:
@@ -380,3 +400,32 @@ def _turns(
         for j in range(3):
             for k in range(3):
                 rotations[i, j, k] = matrix[j, k]
+
+
+@jit
+def _arm_torques(
+    chain: Chain,
+    rows: np.ndarray,
+    rotation: np.ndarray,
+    rates: np.ndarray,
+    turning: np.ndarray,
+    gravity: float,
+    torques: np.ndarray,
+    push: np.ndarray,
+) -> None:
+    """Write the joint torques (m, n) [N m] with friction, and the force on the arm (m, 3) [N].
+
+    See `Feasibility._arm_loads`; turning (m, 3) [rad/s^2]; gravity [m/s^2].
+    """
+    for k in range(len(torques)):
+        acceleration = vector(rows[CHI_DDOT, k, X:ROLL])
+        force = (acceleration[0], acceleration[1], acceleration[2] + gravity)
+        force = turned(transposed(matrix_rows(rotation[k])), force)
+        base = force, vector(rates[k]), vector(turning[k])
+        found, _ = inverse_dynamics(chain, rows[:, k, ALPHA:], *base, torques[k])
+        push[k, 0], push[k, 1], push[k, 2] = found
+        for i in range(torques.shape[1]):
+            speed = rows[CHI_DOT, k, ALPHA + i]
+            torques[k, i] += chain.damping[i] * speed
+            if abs(speed) > STILL:
+                torques[k, i] += math.copysign(chain.friction[i], speed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from uam_control.grasp import (
     Sight,
     grasp_windows,
 )
-from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.place_history import PlaceHistory
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
@@ -28,6 +29,7 @@ from uam_control.mission.shift import Shift
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive
+UPRIGHT = 0.9  # of the z component of a joint's axis
 ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
 
 
@@ -89,10 +91,11 @@ class PayloadWatch:
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = self.executive.parameters = parameters
-        joints, links = self._guidance.motion.shape[1] - ALPHA, parameters.arm_links
-        self._known = len(links) == joints  # the arm's geometry
-        self._links = np.array(links) if self._known else np.zeros(joints)
-        self._mount = np.array(parameters.arm_mount)
+        self._chain, joints = parameters.chain(), self._guidance.motion.shape[1] - ALPHA
+        known = self._chain.has_hand and len(self._chain.masses) == joints
+        self._hand = partial(hand_and_levers, self._chain) if known else None
+        # the first joint that a payload's weight loads in every pose: a yaw joint's lever is zero
+        self._loaded = int(np.argmin(np.abs(self._chain.axes[:, 2]) > UPRIGHT)) if known else 0
 
     def advance(self, stamp: float) -> None:
         """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""
@@ -142,7 +145,7 @@ class PayloadWatch:
 
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:
         p, chi = self._parameters, state[CHI]
-        magnet, arm = magnet_and_lever(chi, self._mount, self._links, p.magnet_length)
+        magnet, levers = self._hand_at(chi)
         self._places.add(readings.stamp, magnet)
         sight = Sight(
             stamp,
@@ -150,15 +153,15 @@ class PayloadWatch:
             magnet,
             error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
             lift=readings.lift,
-            lever=arm,
+            lever=float(levers[self._loaded]),
             on_path=not self._guidance.coming_back,
         )
-        if self._known and -AHEAD <= readings.payload_age <= p.payload_age:
+        if self._hand and -AHEAD <= readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
             sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
             self._look_ahead(sight)
         if len(readings.joint_effort):
-            sight.effort = float(readings.joint_effort[0])
+            sight.effort = float(readings.joint_effort[self._loaded])
         return sight
 
     def _look_ahead(self, sight: Sight) -> None:
@@ -168,17 +171,21 @@ class PayloadWatch:
             return
         if self._planned is None or self._planned[0] is not window:
             self._planned = window, self._magnet_at(window.descent)
-        length = self._parameters.magnet_length
-        chi = self._guidance.reference[CHI]
-        now, _ = magnet_and_lever(chi, self._mount, self._links, length)
+        now, _ = self._hand_at(self._guidance.reference[CHI])
         sight.ahead = self._planned[1] - now + self._shift.value
 
     def _magnet_at(self, time: float) -> np.ndarray:
         """Return the magnet's place (3,) [m] on the path at `time` [s] of the scenario."""
-        guidance, length = self._guidance, self._parameters.magnet_length
+        guidance = self._guidance
         motion = np.zeros_like(guidance.motion)
         guidance.trajectory.write(time, motion)
-        return magnet_and_lever(motion[CHI], self._mount, self._links, length)[0]
+        return self._hand_at(motion[CHI])[0]
+
+    def _hand_at(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return `hand_and_levers` of chi (6 + n,); below the base for an arm that is unknown."""
+        if self._hand:
+            return self._hand(chi)
+        return chi[POSITION].copy(), np.zeros(max(1, len(chi) - ALPHA))
 
     def above_stand(self, chi: np.ndarray) -> bool:
         """Whether a level descent from chi (6 + n,) may come down on a stand."""

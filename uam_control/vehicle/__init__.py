@@ -7,7 +7,6 @@ from uam_control.vehicle.description import (
     GRAVITY,
     POSITION_SERVO,
     SERVO_MODES,
-    Arm,
     Joint,
     Rotor,
     RotorModel,

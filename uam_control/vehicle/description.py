@@ -89,25 +89,14 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Arm:
-    """Geometry of an arm that turns about the body's y axis: mount (3,) [m, FLU], links (n,) [m],
-    the last one to the magnet's pivot, magnet [m]: pivot to face."""
-
-    mount: tuple[float, float, float]
-    links: tuple[float, ...]
-    magnet: float
-
-
-@dataclass(frozen=True)
 class VehicleDescription:
     """The content of the file config/vehicle/NAME.yaml.
 
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
     the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
-    PX4's names. arm: None if the file has no such section; end_effector: site of the MJCF, "" if
-    the file names none, see `chain_reader`. numbers: the whole file, including the
-    values that only the plant reads.
+    PX4's names. end_effector: site of the MJCF, "" if the file names none, see `chain_reader`.
+    numbers: the whole file, including the values that only the plant reads.
     """
 
     name: str
@@ -120,7 +109,6 @@ class VehicleDescription:
     rotors: tuple[Rotor, ...]
     servo: Servo
     joints: tuple[Joint, ...]
-    arm: Arm | None
     end_effector: str
     profiles: dict[str, str]
     autopilot: str

@@ -11,7 +11,6 @@ from uam_control.settings.section import Section, read_section
 from uam_control.vehicle.description import (
     AXES,
     SERVO_MODES,
-    Arm,
     Joint,
     Rotor,
     RotorModel,
@@ -60,7 +59,6 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         rotors=tuple(_rotor(entry) for entry in rotor.entries("layout")),
         servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
-        arm=_arm(top, len(top.entries("joints"))),
         end_effector=top.text("end_effector", default=""),
         profiles={
             law: configuration.beside(file, "profiles", profiles.text(law))
@@ -75,6 +73,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     _check_hover(described)
     _check_servo(described.servo, servo)
     check_plant_numbers(top)
+    top.has("arm")  # of older files: told in a note of the flight
     top.only_asked()
     return described
 
@@ -126,13 +125,6 @@ def _joint(entry: Section) -> Joint:
             f"{entry.where}.stowed_deg: {entry.values['stowed_deg']} is outside the joint's range"
         )
     return Joint(entry.text("name"), low, high, stowed)
-
-
-def _arm(top: Section, joints: int) -> Arm | None:
-    if not top.has("arm"):
-        return None
-    arm = top.section("arm")
-    return Arm(arm.numbers("mount", 3), arm.numbers("links", joints), arm.positive("magnet"))
 
 
 def _check_names(described: VehicleDescription) -> None:

@@ -9,6 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from uam_control.arm.chain import carrying
+from uam_control.arm.dynamics import gravity_torque
+from uam_control.vehicle import chain_of
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, Subcommands, number
 from uam_lab.records.results.terminal import say
@@ -139,16 +142,14 @@ def weight_of(
 
     angles (n,) [rad]: of the others.
     """
-    from uam_control.vehicle.arm_model import ArmModel
-
     vehicle, _ = described(options)
-    model, limits = ArmModel.of(vehicle), vehicle.joints[joint]
+    chain, limits = carrying(chain_of(vehicle), options.load), vehicle.joints[joint]
     grid = np.linspace(limits.low, limits.high, GRID)
     poses = np.repeat(angles[None], GRID, axis=0)
     poses[:, joint] = grid
-    torques = np.array(
-        [model.holding_torques(pose, vehicle.gravity, options.load) for pose in poses]
-    )
+    torques, force = np.empty_like(poses), (0.0, 0.0, vehicle.gravity)
+    for pose, held in zip(poses, torques, strict=True):
+        gravity_torque(chain, pose, force, held)
 
     def weight(angle: float) -> np.ndarray:
         return np.array([np.interp(angle, grid, column) for column in torques.T])

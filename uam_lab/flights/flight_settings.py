@@ -23,6 +23,7 @@ from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.vehicle import (
     POSITION_SERVO,
     VehicleDescription,
+    chain_of,
     load_description,
 )
 from uam_lab.flights import arm_on_ground, node_options, vehicle_changes
@@ -192,7 +193,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         + slower
         + misfits(profile)
         + node_options.unread(profile)
-        + _unsteered(vehicle, scenario, mass),
+        + _about_the_arm(vehicle, scenario, mass),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, presets.read(o.plant_preset, o.effects)),
         without=tuple(dict.fromkeys(without if o.view else (*without, COCKPIT))),
@@ -237,11 +238,14 @@ def _profile(
     return profile, others
 
 
-def _unsteered(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:
-    """Return a note if the flight picks a payload with an arm of unknown lengths."""
-    if vehicle.arm is not None or not scenario.magnet or not mass:
-        return ()
-    return (f"{vehicle.file.name} has no section arm: the magnet is not steered to the payload",)
+def _about_the_arm(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:
+    """Return notes about an entry of older files, and about a payload without an end effector."""
+    name, found = vehicle.file.name, []
+    if "arm" in vehicle.numbers:
+        found.append(f"{name}: arm: not used, the lengths are those of {vehicle.model.name}")
+    if scenario.magnet and mass and not chain_of(vehicle).has_hand:
+        found.append(f"{name} has no end effector: nothing is steered to the payload")
+    return tuple(found)
 
 
 def check_feasible(flight: FlightSettings, faults: Schedule) -> None:

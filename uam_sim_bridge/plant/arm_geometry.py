@@ -1,4 +1,4 @@
-"""Where the arm of the plant's model is: its joints at zero, and its lowest point on the ground.
+"""Where the arm of the plant's model is: its lowest point on the ground.
 
 Read from the compiled model, so that any form of MJCF counts.
 """
@@ -11,21 +11,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from uam_control.vehicle import Arm
-
 BASE, FACE = "base", "magnet_face"  # body and site of the MJCF
 MAGNET, END_EFFECTOR = "magnet", "end_effector"  # body of a magnet, site of an arm without one
 SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 NO_LENGTH = 1e-9  # [m]
-
-
-def measured_arm(model: mujoco.MjModel, joints: Sequence[str]) -> Arm:
-    """Return the arm as it is in the model, with all joints at zero."""
-    data = _posed(model, joints, [0.0] * len(joints))
-    places = [data.joint(name).xanchor for name in (*joints, SWING)]
-    places.append(data.site(FACE).xpos)
-    lengths = [float(upper[2] - lower[2]) for upper, lower in zip(places, places[1:], strict=False)]
-    return Arm(tuple(map(float, places[0])), tuple(lengths[:-1]), lengths[-1])
 
 
 def room_below(

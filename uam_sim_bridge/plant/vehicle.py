@@ -18,19 +18,17 @@ import numpy as np
 from uam_control.mission.scenarios.environment import ENVIRONMENT, default_environment
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
-    Arm,
     Joint,
     VehicleDescription,
     VehicleError,
     load_description,
 )
-from uam_sim_bridge.plant.arm_geometry import BASE, MAGNET, SWING, measured_arm
+from uam_sim_bridge.plant.arm_geometry import BASE, MAGNET, SWING
 from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 MASS_TOLERANCE = 1e-3  # relative
-LENGTH_TOLERANCE = 1e-3  # [m] of the section `arm`
 LOAD_BELOW = 0.0505  # [m] `variation.tip_mass` below the magnet's pivot: where a payload hangs
 
 
@@ -174,7 +172,7 @@ class Vehicle:
         magnet.set_to_adhesion(self.numbers["magnet"]["holding_force"])
 
     def _check_model(self, model: mujoco.MjModel) -> None:
-        """Raise VehicleError if mass, time step or arm contradict the description."""
+        """Raise VehicleError if mass or time step contradict the description."""
         described = self.description
         mass = float(model.body_subtreemass[model.body(BASE).id])
         if not math.isclose(mass, described.mass, rel_tol=MASS_TOLERANCE):
@@ -189,20 +187,6 @@ class Vehicle:
                 f"{described.model}: timestep {model.opt.timestep:g} s does not divide "
                 f"control_period of {described.file.name}, {described.control_period:g} s"
             )
-
-        if described.arm is not None:
-            self._check_arm(described.arm, measured_arm(model, described.joint_names))
-
-    def _check_arm(self, stated: Arm, measured: Arm) -> None:
-        """Raise VehicleError if a length of the section `arm` is not that of the MJCF."""
-        for name in ("mount", "links", "magnet"):
-            given, found = (np.atleast_1d(getattr(arm, name)) for arm in (stated, measured))
-            if np.abs(given - found).max() > LENGTH_TOLERANCE:
-                has = ", ".join(f"{length:.4g}" for length in found.round(4) + 0.0)
-                raise VehicleError(
-                    f"{self.description.file}: arm.{name}: {given.tolist()} m, "
-                    f"{self.description.model.name} has [{has}] m with all joints at 0"
-                )
 
     def _vary(self, model: mujoco.MjModel) -> None:
         """Change masses, inertias and centres of mass as `variation` says."""

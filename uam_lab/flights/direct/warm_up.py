@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from uam_control.coordinates import ALPHA
-from uam_control.grasp.kinematics import magnet_and_lever
+from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
@@ -25,6 +25,7 @@ from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.bridge_stage import sending
 from uam_control.stages.law_stages import arm_step, attitude_step, position_step
+from uam_control.vehicle import chain_of
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
 from uam_sim_bridge.autopilot.joined import STEPS
@@ -130,7 +131,8 @@ def _stand_in() -> None:
 def _others() -> None:
     curve = load_scenario("circle")
     limits = default_profile(catalogue.DEFAULT).sets["mission"]
-    check = Feasibility(Vehicle.load().description, limits, 0.0)
+    vehicle = Vehicle.load().description
+    check = Feasibility(vehicle, limits, 0.0)
     for scenario in (load_scenario("hover"), curve):
         check.excesses(scenario)
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
@@ -138,7 +140,7 @@ def _others() -> None:
     for stamp in (0.0, 0.004):
         mean.add(stamp, np.zeros(3))
     joints = len(curve.arm_start)
-    magnet_and_lever(np.zeros(ALPHA + joints), [0.0] * 3, [0.0] * joints, 0.0)
+    hand_and_levers(chain_of(vehicle), np.zeros(ALPHA + joints))
     vision_message(VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0))
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
 
