@@ -36,9 +36,7 @@ def with_joints(count: int, folder: Path) -> str:
     values = _read("vehicle/s500_arm.yaml")
     joints = [{"name": f"alpha_{k}", **JOINT} for k in range(1, count + 1)]
     joints[1]["stowed_deg"] = STOWED
-    links = [ARM_LENGTH / count] * count
     values |= {"model": f"{name}.xml", "joints": joints, "mass": _mass(folder / f"{name}.xml")}
-    values["arm"] |= {"links": links}
     profile = _read("profiles/s500.yaml")
     own = profile["arm_controller"]["ros__parameters"]
     for key, value in own.items():

@@ -7,10 +7,11 @@ from growing.flights import DIRECT, Point
 from growing.further_recorder import CHOSEN
 from growing.vehicles import with_joints, with_rotors
 
+from uam_control.arm.kinematics import DOWN, hand_pose
 from uam_control.coordinates import ARM, POSITION
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
-from uam_control.vehicle import load_description
+from uam_control.vehicle import chain_of, load_description
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.plant import Vehicle
@@ -20,7 +21,8 @@ from uam_sim_bridge.plant import Vehicle
 def test_a_vehicle_has_the_joints(tmp_path, count):
     described = load_description(with_joints(count, tmp_path))
     assert len(described.joint_names) == count
-    assert sum(described.numbers["arm"]["links"]) == pytest.approx(0.24, abs=0.03)
+    reach, _ = hand_pose(chain_of(described), np.zeros(count), DOWN)
+    assert -reach[2] == pytest.approx(0.073 + 0.24 + 0.03, abs=0.03)  # mount, links, magnet
 
 
 @pytest.mark.parametrize("count", [4, 6, 8])

@@ -167,6 +167,52 @@ def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, message):
     assert message in str(error.value) and "\n" not in str(error.value)
 
 
+def two_servos(**changes):
+    """The S-500 with a weaker servo at its second joint; changes: of that type."""
+    one = S500.numbers["servos"]
+    weak = one | {"stall_torque": 1.5, "effort_limit": 1.2, "current_unit": 0.001} | changes
+    joints = [
+        entry | {"servo": name}
+        for entry, name in zip(S500.numbers["joints"], ("strong", "weak"), strict=True)
+    ]
+    return S500.numbers | {"servos": {"strong": one, "weak": weak}, "joints": joints}
+
+
+def test_a_servo_type_for_each_joint():
+    described = describe(two_servos(), S500.file)
+    assert derived_parameters(described)["mission"]["joint_effort_hold"] == [2.8, 1.2]
+    assert [described.servo_numbers(i)["current_unit"] for i in range(2)] == [0.00269, 0.001]
+    servos = MujocoPlant(Vehicle.of(described), 0.0, 1).servos
+    servos.command[:] = 2.0
+    servos.step(np.zeros(2), np.zeros(2), np.zeros(2))
+    # whole current units of 3.508 mN m; the weak one's stall torque
+    assert servos.torque == pytest.approx([round(2.0 / 0.00350776) * 0.00350776, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        (two_servos(mode="position"), "servos.mode: strong current, weak position: the servos of"),
+        (two_servos(effort_limit=2.0), "servos.weak.effort_limit: 2 N m is above stall_torque"),
+        (two_servos() | {"joints": S500.numbers["joints"]}, "joints[0].servo is missing"),
+        (S500.numbers | {"joints": two_servos()["joints"]}, "joints[0].servo: servos has no types"),
+        (
+            two_servos() | {"joints": [two_servos()["joints"][0]]},
+            "servos.weak: no joint has this servo",
+        ),
+    ],
+)
+def test_servo_types_that_contradict_are_refused_in_one_line(numbers, message):
+    with pytest.raises(VehicleError) as error:
+        describe(numbers, S500.file)
+    assert message in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_section_of_older_files_is_left_alone():
+    numbers = S500.numbers | {"arm": {"mount": [0, 0, 0], "links": [1, 1], "magnet": 0.03}}
+    assert describe(numbers, S500.file).servos == S500.servos
+
+
 @pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
 def test_the_arm_reaches_as_far_as_in_the_mjcf(name):
     vehicle = Vehicle.load(name)

@@ -203,7 +203,7 @@ class Feasibility:
             )
             found += [
                 (f"joint {i + 1} angle", angle, p.joint_angle_hold[i], "rad"),
-                (f"joint {i + 1} rate", rate, self.vehicle.servo.no_load_speed, "rad/s"),
+                (f"joint {i + 1} rate", rate, self.vehicle.servos[i].no_load_speed, "rad/s"),
                 (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
             ]
         holding = self.vehicle.numbers["magnet"]["holding_force"]

@@ -13,7 +13,8 @@ from uam_control.vehicle.loading import VehicleError
 if TYPE_CHECKING:
     import mujoco
 
-BASE, FACE = "base", "magnet_face"  # body of the MJCF; its end effector, unless the YAML names one
+BASE = "base"  # body of the MJCF
+HANDS = "end_effector", "magnet_face"  # sites: the first of them, where the YAML names none
 OUTSIDE, SWINGS, OF_BASE = -2, -1, 0  # owners of a body; the link of joint i, from 1 on, is i
 Lump = tuple[float, np.ndarray, np.ndarray]  # mass [kg], centre (3,) [m], inertia about it (3, 3)
 
@@ -33,7 +34,7 @@ def chain_of(vehicle: VehicleDescription) -> Chain:
 def read_chain(model: mujoco.MjModel, joints: tuple[str, ...], end_effector: str) -> Chain:
     """Return the arm of a compiled model.
 
-    joints: base to tip; end_effector: a site, "" for `FACE`, if there is one. Raises ValueError for
+    joints: base to tip; end_effector: a site, "" for one of `HANDS`. Raises ValueError for
     joints that are no serial chain of 1 to 7 hinges on the body `base`, and for a site that the
     last link does not carry.
     """
@@ -141,7 +142,10 @@ class _Reader:
         import mujoco
 
         kind = mujoco.mjtObj.mjOBJ_SITE
-        return self._id(kind, name) if name else mujoco.mj_name2id(self._model, kind, FACE)
+        if name:
+            return self._id(kind, name)
+        found = (mujoco.mj_name2id(self._model, kind, one) for one in HANDS)
+        return next((site for site in found if site >= 0), -1)
 
     def _hinge_of(self, site: int) -> int | None:
         """Return the passive hinge that the site hangs on; mark the bodies below it as SWINGS."""

@@ -32,7 +32,7 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             "joint_angle_hold": [
                 _rounded_down(min(-joint.low, joint.high)) for joint in vehicle.joints
             ],
-            "joint_effort_hold": [vehicle.servo.effort_limit] * len(vehicle.joints),
+            "joint_effort_hold": [servo.effort_limit for servo in vehicle.servos],
             **arm,
         },
         "mavlink_bridge": {

@@ -64,7 +64,7 @@ SERVO_MODES = CURRENT_SERVO, POSITION_SERVO = "current", "position"
 
 @dataclass(frozen=True)
 class Servo:
-    """Parameters common to all joint servos.
+    """Parameters of the servo of a joint.
 
     stall_torque [N m]; no_load_speed [rad/s]; effort_limit: measured torque at which the supervisor
     holds [N m].
@@ -96,7 +96,8 @@ class VehicleDescription:
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
     the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
     PX4's names. end_effector: site of the MJCF, "" if the file names none, see `chain_reader`.
-    numbers: the whole file, including the values that only the plant reads.
+    servos: of each joint. numbers: the whole file, including the values that only the plant reads;
+    an entry of `servos` that is not the same for all joints is a list.
     """
 
     name: str
@@ -107,7 +108,7 @@ class VehicleDescription:
     control_period: float
     rotor: RotorModel
     rotors: tuple[Rotor, ...]
-    servo: Servo
+    servos: tuple[Servo, ...]
     joints: tuple[Joint, ...]
     end_effector: str
     profiles: dict[str, str]
@@ -160,6 +161,11 @@ class VehicleDescription:
         """Normalised thrust in hover [1], to 1 %: weight / full thrust, as THR_MDL_FAC
         linearises."""
         return round(self.mass * self.gravity / self.full_thrust, 2)
+
+    def servo_numbers(self, joint: int) -> dict[str, Any]:
+        """Return the entries of `servos` for a joint, counted from 0."""
+        entries = self.numbers["servos"].items()
+        return {key: one[joint] if isinstance(one, list) else one for key, one in entries}
 
     def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return px, py, km, each (rotors,) [m], in PX4's convention and motor order.

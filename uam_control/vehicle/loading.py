@@ -18,6 +18,7 @@ from uam_control.vehicle.description import (
     VehicleDescription,
 )
 from uam_control.vehicle.plant_numbers import check_plant_numbers
+from uam_control.vehicle.servo_types import merged, servo_types
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
@@ -46,7 +47,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     model = file.parent / top.text("model")
     if not model.is_file():
         raise VehicleError(f"{file}: model: {model} does not exist")
-    rotor, servo = top.section("rotors"), top.section("servos")
+    rotor, servos = top.section("rotors"), servo_types(top)
     profiles = top.section("profiles")
     described = VehicleDescription(
         name=file.stem,
@@ -57,7 +58,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         control_period=_control_period(top),
         rotor=_rotor_model(rotor),
         rotors=tuple(_rotor(entry) for entry in rotor.entries("layout")),
-        servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
+        servos=tuple(_servo(one) for one in servos),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         end_effector=top.text("end_effector", default=""),
         profiles={
@@ -66,13 +67,12 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         },
         autopilot=top.text("autopilot"),
         autopilot_gains=_autopilot_gains(top, file),
-        numbers=document,
+        numbers=document | {"servos": merged(servos)},
     )
     _check_names(described)
     _check_rotors(described, rotor)
     _check_hover(described)
-    _check_servo(described.servo, servo)
-    check_plant_numbers(top)
+    check_plant_numbers(top, servos)
     top.has("arm")  # of older files: told in a note of the flight
     top.only_asked()
     return described
@@ -152,7 +152,8 @@ def _check_hover(described: VehicleDescription) -> None:
         )
 
 
-def _check_servo(servo: Servo, section: Section) -> None:
+def _servo(section: Section) -> Servo:
+    servo = Servo(*map(section.positive, ("stall_torque", "no_load_speed", "effort_limit")))
     section.one_of("mode", SERVO_MODES)
     section.positive("position_p_gain")
     section.positive("pwm_limit")
@@ -161,3 +162,4 @@ def _check_servo(servo: Servo, section: Section) -> None:
             f"{section.where}.effort_limit: {servo.effort_limit:g} N m is above stall_torque, "
             f"{servo.stall_torque:g} N m"
         )
+    return servo

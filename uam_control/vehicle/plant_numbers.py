@@ -14,8 +14,11 @@ NOT_OF_THE_PLANT = (
 )
 
 
-def check_plant_numbers(top: Section) -> None:
-    """Raise the section's error if an entry that only plant or drivers read is not usable."""
+def check_plant_numbers(top: Section, servos: list[Section]) -> None:
+    """Raise the section's error if an entry that only plant or drivers read is not usable.
+
+    servos: those of each joint.
+    """
     air = top.section("air")
     air.numbers("drag", 3)
     air.numbers("wind", 3)
@@ -35,10 +38,10 @@ def check_plant_numbers(top: Section) -> None:
         mocap.switch("payload")
     for sensor in (mocap, imu, joints):
         sensor.whole("latency_ticks")
-    servos = top.section("servos")
-    servos.whole("command_latency_ticks")
-    for name in filter(servos.has, ("torque_per_current", "current_unit")):
-        servos.positive(name)
+    for servo in servos:
+        servo.whole("command_latency_ticks")
+        for name in filter(servo.has, ("torque_per_current", "current_unit")):
+            servo.positive(name)
     variation = top.section("variation")
     for name in ("mass", "inertia"):
         variation.positive(name)

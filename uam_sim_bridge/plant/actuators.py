@@ -98,13 +98,9 @@ class Servos:
                 float(self.in_position_mode),
             ]
         )
-        self.constants = np.array(
-            [
-                numbers["stall_torque"],
-                numbers["no_load_speed"],
-                numbers["torque_per_current"] * numbers["current_unit"],
-            ]
-        )
+        unit = np.multiply(numbers["torque_per_current"], numbers["current_unit"])
+        constants = numbers["stall_torque"], numbers["no_load_speed"], unit
+        self.constants = np.array([one + np.zeros(len(start)) for one in map(np.array, constants)])
         self.torque = np.zeros(len(start))
         self.waiting = np.full((numbers["command_latency_ticks"], len(start)), np.nan)
 
@@ -171,9 +167,9 @@ def position_step(
     speed), the line of a DC motor at the voltage of the duty. Source: ROBOTIS e-manual, XM430-W210,
     Position PID Gain. The maker's I and D gains are 0.
     """
-    stall, no_load = constants[0], constants[1]
     gain, limit, count = loop[0], loop[1], loop[2]
     for i in range(len(goal)):
+        stall, no_load = constants[0, i], constants[1, i]
         error = np.round(goal[i] / count) - np.round(angle[i] / count)
         duty = min(limit, max(-limit, gain * error))
         torque[i] = min(stall, max(-stall, stall * (duty - velocity[i] / no_load)))
@@ -190,11 +186,12 @@ def servo_step(
 ) -> None:
     """Write torque and output (n,) [N m]: effort in whole current units, within the speed limit.
 
-    effort (n,) [N m]; velocity (n,) [rad/s]; constants (3,): stall torque [N m], no-load speed
-    [rad/s], torque of one current unit [N m]. Limit: stall torque (1 - speed / no-load speed).
+    effort (n,) [N m]; velocity (n,) [rad/s]; constants (3, n): stall torque [N m], no-load
+    speed [rad/s], torque of one current unit [N m]. Limit: stall torque (1 - speed / no-load
+    speed).
     """
-    stall, no_load, unit = constants[0], constants[1], constants[2]
     for i in range(len(effort)):
+        stall, no_load, unit = constants[0, i], constants[1, i], constants[2, i]
         desired = unit * np.round(effort[i] / unit)
         forward = max(0.0, min(1.0, 1.0 - velocity[i] / no_load)) * stall
         backward = max(0.0, min(1.0, 1.0 + velocity[i] / no_load)) * stall

@@ -11,6 +11,7 @@ from uam_control.vehicle import Servo
 from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
 BASE_LINK = "base_link"  # REP-105's name of the base
+PASSIVE = Servo(0.0, 0.0, 0.0)  # of a hinge without one
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda s: ("sphere", {"radius": _text(s[:1])}),
@@ -30,7 +31,8 @@ def urdf(vehicle: Vehicle) -> str:
     """Return the URDF text: base and arm, inertia and visuals; frames as in the MJCF (FLU)."""
     model = vehicle.compile(0.0)
     robot = ElementTree.Element("robot", name=model.body(BASE).name)
-    root = model.body(BASE).id
+    root, described = model.body(BASE).id, vehicle.description
+    servos = dict(zip(described.joint_names, described.servos, strict=True))
     for body in (root, *carried(model)):
         name = BASE_LINK if body == root else model.body(body).name
         link = ElementTree.SubElement(robot, "link", name=name)
@@ -40,7 +42,7 @@ def urdf(vehicle: Vehicle) -> str:
         if body != root:
             parent = model.body_parentid[body]
             owner = BASE_LINK if parent == root else model.body(parent).name
-            _joint(robot, model, body, owner, vehicle.description.servo)
+            _joint(robot, model, body, owner, servos)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 
@@ -93,7 +95,11 @@ def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None
 
 
 def _joint(
-    robot: ElementTree.Element, model: mujoco.MjModel, body: int, parent: str, servo: Servo
+    robot: ElementTree.Element,
+    model: mujoco.MjModel,
+    body: int,
+    parent: str,
+    servos: dict[str, Servo],
 ) -> None:
     hinge = model.body_jntnum[body] > 0
     index = model.body_jntadr[body]
@@ -113,6 +119,7 @@ def _joint(
         ElementTree.SubElement(joint, "axis", xyz=_text(model.jnt_axis[index]))
     if limited:
         low, high = model.jnt_range[index]
+        servo = servos.get(name, PASSIVE)
         ElementTree.SubElement(
             joint,
             "limit",

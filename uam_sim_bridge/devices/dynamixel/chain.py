@@ -8,7 +8,7 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
-from uam_control.vehicle import Joint, VehicleDescription
+from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel.control_table import (
     ControlTable,
@@ -171,14 +171,15 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     delay = _whole(arm, "return_delay_us", 0, 508)
     if delay % 2:
         raise arm.error("return_delay_us", f"{delay} is odd; the servos' unit is 2 us")
-    servos = tuple(_servo(entries[joint.name], joint, vehicle) for joint in vehicle.joints)
+    servos = tuple(_servo(entries[name], i, vehicle) for i, name in enumerate(joints))
     ids = [servo.id for servo in servos]
     if len(set(ids)) < len(ids):
         raise arm.error("servos", f"ids {', '.join(map(str, ids))}: each servo needs its own")
     return ArmChain(arm.text("device"), int(speed), 1e-6 * delay, servos)
 
 
-def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDescription:
+def _servo(entry: Section, number: int, vehicle: VehicleDescription) -> ServoDescription:
+    joint = vehicle.joints[number]
     entry.only(SERVO)
     try:
         table = control_table(entry.text("model"))
@@ -189,7 +190,7 @@ def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDe
     direction = _whole(entry, "direction", -1, 1)
     if direction == 0:
         raise entry.error("direction", "0 is not one of 1, -1")
-    motor = Section(vehicle.numbers["servos"] | entry.values, entry.where, ArmError)
+    motor = Section(vehicle.servo_numbers(number) | entry.values, entry.where, ArmError)
     unit, gear = motor.positive("current_unit"), entry.positive("gear")
     _check_unit(entry, table, unit)
     limit, scale = entry.positive("current_limit"), entry.positive("torque_scale")
