@@ -10,6 +10,7 @@ import json
 
 import numpy as np
 import pytest
+import tilted_arm
 import yaml
 from whole_flight import SHORT, Flight
 
@@ -71,6 +72,30 @@ def test_it_flies_in_the_direct_engine(name, scenario):
         moved = [np.ptp(series[f"truth.alpha_{i}"]) for i in (1, 2, 3)]
         # 40 to -40, 90 to 30 and 60 to -60 degrees
         assert np.degrees(moved) == pytest.approx([80.0, 60.0, 120.0], abs=4.0)
+
+
+MOTIONS = """
+arm_start: {alpha_1_deg: 0, alpha_2_deg: 0, alpha_3_deg: 80}
+moves:
+  - {coordinate: z, from: 0, until: 3, to: 1.2}
+  - {coordinate: alpha_1, from: 3, until: 5, to_deg: 60}
+  - {coordinate: alpha_2, from: 4, until: 6, to_deg: -40}
+  - {coordinate: alpha_3, from: 5, until: 7, to_deg: 20}
+  - {coordinate: alpha_1, from: 7, until: 9, to_deg: 0}
+  - {coordinate: alpha_2, from: 7, until: 9, to_deg: 0}
+  - {coordinate: alpha_3, from: 7, until: 9, to_deg: 80}
+landing: {at: 10, duration: 5}
+"""
+
+
+def test_an_arm_of_any_axis_on_a_tilted_mount_flies(tmp_path):
+    scenario = tmp_path / "motions.yaml"
+    scenario.write_text(MOTIONS)
+    found = judged(fly(str(tilted_arm.make(tmp_path)), str(scenario)))
+    assert found["mission_completed"], found["shortfalls"]
+    assert max(found["rms"]["position_m"]) < 0.01
+    assert max(found["rms"]["attitude_deg"]) < 0.4, found["rms"]
+    assert max(found["rms"]["arm_deg"]) < 0.5, found["rms"]
 
 
 def test_the_third_joint_is_supervised():

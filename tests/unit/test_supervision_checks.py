@@ -29,6 +29,7 @@ def measured(state, reference=None, mocap=(math.nan,) * 3, age=math.nan, ground=
     values = np.full(len(CHECKS), 77.0)
     reference = np.zeros(state.shape) if reference is None else reference
     limits = np.ones(state.shape[1] - 6) if joints is None else np.array(joints)
+    limits = np.stack([limits, 0.0 * limits]) if limits.ndim == 1 else limits
     measure(state, reference, np.array(mocap), age, ground, BOX, limits, values)
     np.testing.assert_array_equal(values[9:], 77.0)
     return values[:9]
@@ -44,6 +45,9 @@ def test_quantities_of_a_state():
     # 8.3 rad behind: a turn less
     expected = [0.0, 3.0, math.acos(0.48), 4.0, 2.5, -1.0, 0.5, -math.inf, 8.3 - 2.0 * math.pi]
     np.testing.assert_allclose(values, expected)
+    # 2 rad below its middle, of 4 rad allowed; 1.5 rad below, of 2.5 rad
+    around = [[4.0, 2.5], [1.0, 2.0]]
+    assert measured(state, joints=around)[6] == pytest.approx(0.6)
     state[0, 3:5] = math.pi - A, 0.0  # upside down
     assert measured(state)[2] == pytest.approx(math.pi - A)
 

@@ -10,6 +10,7 @@ import yaml
 
 from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.mission import load_scenario
+from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
 from uam_control.setpoints.rotor_geometry import normalised_mixer
@@ -63,6 +64,17 @@ def test_the_nodes_of_the_s500():
     assert nodes["mavlink_bridge"]["rotor_thrust_max"] == 10.34
 
 
+def test_a_range_beside_zero_is_held_at_both_of_its_ends():
+    described = describe(changed((("joints", 1, "range_deg"), [-30, 100])), S500.file)
+    values = derived_parameters(described)["mission"]
+    # half of 130 deg is 1.1345 rad, 35 deg is 0.610865
+    assert values["joint_angle_hold"] == [1.9, 1.1]
+    assert values["joint_angle_middle"] == [0.0, 0.610865]
+    low, high = MissionParameters.from_mapping(values, 2).joint_ranges
+    np.testing.assert_allclose(low, [-1.9, -0.489135])
+    np.testing.assert_allclose(high, [1.9, 1.710865])
+
+
 def test_what_the_model_is_made_of():
     model = Vehicle.of(S500).compile(0.2)
     low, high = model.joint("alpha_2").range
@@ -94,7 +106,7 @@ def test_what_the_model_is_made_of():
         ((("rotors", "layout", 1, "direction"), "left"), "layout[1].direction: 'left' is not one"),
         ((("rotors", "layout", 1, "name"), "rotor_1"), "rotor_1: the name of several parts"),
         ((("rotors", "layout", 1, "position"), [0, 0]), "position: a list of 3 numbers expected"),
-        ((("joints", 0, "range_deg"), [0, 90]), "does not have 5.7 deg to either side of 0"),
+        ((("joints", 0, "range_deg"), [0, 11]), "[0, 11] is less than 11.5 deg wide"),
         ((("joints", 1, "stowed_deg"), 150), "joints[1].stowed_deg: 150 is outside the joint"),
         ((("servos", "effort_limit"), 4.0), "4 N m is above stall_torque, 3 N m"),
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),

@@ -158,8 +158,12 @@ class Feasibility:
         ground = demand.position[0, Z] if ground is None else ground
         low, high = self._room(ground)
         place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
+        lowest, highest = p.joint_ranges
+        angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
+        upper += [(*angle, highest[i], "rad") for i, angle in enumerate(angles)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
+        lower += [(*angle, lowest[i], "rad") for i, angle in enumerate(angles)]
         height, sinking = self._near_ground(demand, ground)
         lower.append((DRAGGED, height, p.touchdown_height, "m"))
         upper.append(("sink rate near the ground", sinking, HARD, "m/s"))
@@ -197,12 +201,10 @@ class Feasibility:
         """Return the same of arm and magnet."""
         p, found = self.limits, []
         for i in range(demand.angles.shape[1]):
-            angle, rate, torque = (
-                np.abs(values[:, i])
-                for values in (demand.angles, demand.joint_rates, demand.joint_torques)
+            rate, torque = (
+                np.abs(values[:, i]) for values in (demand.joint_rates, demand.joint_torques)
             )
             found += [
-                (f"joint {i + 1} angle", angle, p.joint_angle_hold[i], "rad"),
                 (f"joint {i + 1} rate", rate, self.vehicle.servos[i].no_load_speed, "rad/s"),
                 (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
             ]

@@ -345,8 +345,7 @@ def check(plan: Plan, p: MissionParameters, ground: float) -> None:
         within = values[CHI, :, POSITION]
     else:
         names, unit = [f"alpha_{i + 1}" for i in range(values.shape[2])], "rad"
-        high = np.array(p.joint_angle_hold)
-        low, within = -high, values[CHI]
+        (low, high), within = p.joint_ranges, values[CHI]
     low_now, high_now = np.minimum(low, within[0]), np.maximum(high, within[0])
     for i, name in enumerate(names):
         beyond = np.maximum(low_now[i] - within[:, i], within[:, i] - high_now[i])

@@ -144,8 +144,9 @@ class ExceededLimit(NamedTuple):
 class CheckArrays(NamedTuple):
     """bounds: all limits in one array. Of every quantity the lowest limit, below which no monitor
     changes while all are quiet; low and high corner (3,) of the box [m]; gains (3,) of position,
-    attitude, arm; `joints` angles [rad]; torques [N m]. values: of CHECKS; numbers (1,): joints,
-    setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the parameters."""
+    attitude, arm; `joints` angles [rad] and their middle; torques [N m]. values: of CHECKS;
+    numbers (1,): joints, setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the
+    parameters."""
 
     bounds: np.ndarray
     values: np.ndarray
@@ -187,7 +188,8 @@ class Checks:
         )
         first = [min(limits) for limits in self._limits]
         parts = first, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
-        bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
+        parts += np.zeros(len(p.joint_angle_hold)) + p.joint_angle_middle, p.joint_effort_hold
+        bounds = np.concatenate([np.array(part) for part in parts])
         self.arrays = CheckArrays(bounds.astype(float), self._values, self.memory)
         self.memory["joints"] = len(p.joint_angle_hold)
         self.memory["delay_nominal"] = p.delay_nominal
@@ -261,12 +263,11 @@ def measure_all(
     m, bounds, values = a.numbers[0], a.bounds, a.values
     box, gain = _CHECKED, _CHECKED + 6
     angle = gain + 3
-    effort = angle + m.joints
+    effort = angle + 2 * m.joints
     known = readings.values
     corners, age = bounds[box:gain].reshape((2, 3)), known[_MOCAP_AGE]
-    measure(
-        *(state, reference, readings.position, age, ground, corners, bounds[angle:effort], values)
-    )
+    ranges = bounds[angle:effort].reshape((2, m.joints))
+    measure(state, reference, readings.position, age, ground, corners, ranges, values)
     read(known, readings.effort, readings.gains, bounds[effort:], bounds[gain:angle], values)
     link = by_link(known[_ROUND_TRIP], m.share, in_flight)
     loop = by_loop(known[_LOOP_DELAY], m.delay_nominal, in_flight)
@@ -291,7 +292,8 @@ def measure(
     only values[0].
 
     mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
-    and high corner [m]; joints (n,): limits of the angles [rad].
+    and high corner [m]; joints (2, n): limits of the angles [rad] to either side of
+    their middle, and the middle.
     """
     values[0] = 0.0
     for i in range(3):
@@ -311,7 +313,9 @@ def measure(
     values[3] = rate
     values[4] = state[CHI, Z] - ground
     values[5] = outside
-    values[6] = _largest(state[CHI, ALPHA:], joints)
+    values[6] = -math.inf
+    for i in range(min(state.shape[1] - ALPHA, joints.shape[1])):
+        values[6] = max(values[6], abs(state[CHI, ALPHA + i] - joints[1, i]) / joints[0, i])
     values[8] = abs(wrapped(state[CHI, YAW] - reference[CHI, YAW]))
     values[7] = math.sqrt(apart) if usable(age, FORWARDED) and not math.isnan(apart) else -math.inf
 

@@ -7,6 +7,8 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from uam_control import ages
 from uam_control.settings.parameter_set import (
     ParameterError,
@@ -46,8 +48,9 @@ class SupervisionLimits(ParameterSet):
     geofence_land: float = _land(0.1, "distance outside the geofence", "m", 0.0, 100.0)
     geofence_failsafe: float = _failsafe(2.0, "distance outside the geofence", "m", 0.0, 1000.0)
     joint_angle_hold: tuple = vector(
-        (), "joint angle, to either side, that starts a hold", "rad", 0.01, 6.3
+        (), "angle of a joint to either side of its middle that starts a hold", "rad", 0.01, 6.3
     )
+    joint_angle_middle: tuple = vector((0.0,), "middle of a joint's range", "rad", -6.3, 6.3)
     joint_effort_hold: tuple = vector(
         (), "measured joint torque that starts a hold", "N m", 0.01, 100.0
     )
@@ -222,3 +225,8 @@ class Reactions(ParameterSet):
 @dataclass(frozen=True)
 class SupervisionParameters(Reactions, SupervisionLimits):
     """All parameters of the supervisor."""
+
+    @property
+    def joint_ranges(self) -> np.ndarray:
+        """Lowest and highest angle (2, n) [rad] of each joint that start no hold."""
+        return np.multiply.outer((-1.0, 1.0), self.joint_angle_hold) + self.joint_angle_middle

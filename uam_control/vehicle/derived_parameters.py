@@ -30,7 +30,10 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             "gravity": vehicle.gravity,
             "drag": drag,
             "joint_angle_hold": [
-                _rounded_down(min(-joint.low, joint.high)) for joint in vehicle.joints
+                _rounded_down(0.5 * (joint.high - joint.low)) for joint in vehicle.joints
+            ],
+            "joint_angle_middle": [
+                round(0.5 * (joint.low + joint.high), 6) for joint in vehicle.joints
             ],
             "joint_effort_hold": [servo.effort_limit for servo in vehicle.servos],
             **arm,

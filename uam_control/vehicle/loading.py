@@ -24,7 +24,7 @@ DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
 LONGEST_PERIOD = 0.008  # [s] of a tick: the attitude loop oscillates in yaw with 10 ms
 HOVERS = 0.1, 0.8  # share of the full thrust in hover: the range of the autopilot, MPC_THR_HOVER
-LEAST_RANGE = 0.1  # [rad] to either side of 0, because the supervisor's limits are symmetric
+LEAST_RANGE = 0.2  # [rad] of a joint: the supervisor holds at its ends
 
 
 class VehicleError(ValueError):
@@ -115,10 +115,10 @@ def _rotor(entry: Section) -> Rotor:
 def _joint(entry: Section) -> Joint:
     low, high = (math.radians(limit) for limit in entry.numbers("range_deg", 2))
     stowed = math.radians(entry.number("stowed_deg"))
-    if not (low <= -LEAST_RANGE and high >= LEAST_RANGE):
+    if high - low < LEAST_RANGE:
         raise VehicleError(
-            f"{entry.where}.range_deg: {entry.values['range_deg']} does not have "
-            f"{math.degrees(LEAST_RANGE):.1f} deg to either side of 0"
+            f"{entry.where}.range_deg: {entry.values['range_deg']} is less than "
+            f"{math.degrees(LEAST_RANGE):.1f} deg wide"
         )
     if not low <= stowed <= high:
         raise VehicleError(
