@@ -136,7 +136,7 @@ def test_answers_take_the_place_of_assumptions(tmp_path):
     described = made.description
     assert described.rotor.thrust_max == pytest.approx(9.0, rel=1e-4)
     assert described.rotor.lag_up == 0.04
-    assert described.servo.stall_torque == 4.1
+    assert described.servos[0].stall_torque == 4.1
     assert "lag_up: 0.04  # asked" in (tmp_path / "out" / "mine.yaml").read_text()
 
 
@@ -400,7 +400,7 @@ def test_a_drone_without_an_arm_gets_that_of_another_vehicle(tmp_path):
     other = load_description("s500_arm3")
     made, _ = imported(tmp_path, drone(arm=False), arm_of=other)
     assert made.description.joint_names == other.joint_names
-    assert made.description.servo == other.servo
+    assert made.description.servos == other.servos
     for mine, theirs in zip(made.description.joints, other.joints, strict=True):
         assert (mine.low, mine.high) == pytest.approx((theirs.low, theirs.high), abs=1e-3)
 
