@@ -7,7 +7,7 @@ import numpy as np
 
 from uam_control.vehicle import VehicleDescription
 from uam_lab.importing import geometry, structure
-from uam_lab.importing.answers import Told
+from uam_lab.importing.answers import DERIVED, Told
 from uam_lab.importing.source import ImportRefused, Source
 
 BELOW = 0.06  # [m] from the centre of mass: where the underside of the base is looked for
@@ -45,7 +45,7 @@ def hang(source: Source, chosen: structure.Chosen, vehicle: VehicleDescription) 
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ImportRefused(f"{vehicle.model}: its arm cannot be hung: {reason}") from None
-    return Told([round(float(x), 4) for x in place], "derived", f"arm of {vehicle.name}")
+    return Told([round(float(x), 4) for x in place], DERIVED, f"arm of {vehicle.name}")
 
 
 def _underside(parts: structure.Parts) -> np.ndarray:

@@ -88,7 +88,7 @@ def find_rotors(
     for pattern in NAMES:
         named = [b for b in bodies if b != base and _is_named(model, b, pattern)]
         found = [
-            rotor(model.body(b).name, _centre(model, data, b), _spin(model, data, b), b)
+            rotor(model.body(b).name, _centre(model, data, b, origin), _spin(model, data, b), b)
             for b in named
         ]
         groups.append(_apart(found))
@@ -119,10 +119,16 @@ def _of_body(source: Source, model: mujoco.MjModel, body: int) -> RotorFacts | N
     return next((source.rotors[name] for name in names if name in source.rotors), None)
 
 
-def _centre(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> np.ndarray:
-    """Return where a rotor's body is [m]: at its joint, or in the middle of what it shows."""
+def _centre(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, origin: np.ndarray
+) -> np.ndarray:
+    """Return where a rotor's body is [m]: at its joint or frame; in the middle of its first shape
+    where the frame is at the origin (3,) [m] of the base."""
     if model.body_jntnum[body]:
         return data.xanchor[model.body_jntadr[body]]
+    own = np.flatnonzero(model.geom_bodyid == body)
+    if len(own) and np.linalg.norm(data.xpos[body] - origin) < ONE_PLACE:
+        return data.geom_xpos[own[0]]
     return data.xpos[body]
 
 

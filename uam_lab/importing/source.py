@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +12,10 @@ from lxml import etree
 from uam_control.vehicle import VehicleError
 
 LARGEST_FILE = 20e6  # [bytes] of a description
-OTHERS = {"sdf": "gz sdf -p, or a URDF of the same vehicle", "mujocoinclude": "the file it is in"}
+OTHERS = {
+    "sdf": "gz sdf -p, or a URDF of the same vehicle",
+    "mujocoinclude": "the file that has it",
+}
 NAMED = re.compile(r"(?:name|material|mesh|body|joint|link) '([^']+)'")  # in a text of MuJoCo
 
 
@@ -112,11 +114,6 @@ def tree(file: Path) -> etree._Element:
     except etree.XMLSyntaxError as error:
         said = " ".join(str(error.msg).split())
         raise ImportRefused(f"{file} line {error.lineno}: no XML: {said}") from None
-
-
-def elements(root: etree._Element, *names: str) -> Iterator[etree._Element]:
-    """Yield the elements of these names, without comments."""
-    yield from root.iter(*names)
 
 
 def kind_of(file: Path, root: etree._Element) -> str:

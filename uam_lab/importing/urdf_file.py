@@ -51,7 +51,7 @@ class _Urdf:
                 _fill(link)
         meshes = Meshes(self.file)
         for mesh in list(self.root.iter("mesh")):
-            if meshes.take(mesh) is False:
+            if not meshes.take(mesh):
                 shape = mesh.getparent().getparent()  # visual or collision
                 shape.getparent().remove(shape)
         lines = {
