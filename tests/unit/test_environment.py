@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import pytest
 import yaml
@@ -17,18 +19,7 @@ HOVER = {
     "moves": [{"coordinate": "z", "from": 0, "until": 3, "to": 1.2}],
     "landing": {"at": 5, "duration": 3},
 }
-EVERY_KIND = [
-    {"kind": "table", "position": [-1.2, 0.3], "yaw_deg": 20, "height": 0.6},
-    {"kind": "shelf", "position": [1.4, 0.0]},
-    {"kind": "wall", "position": [0.0, 2.0], "yaw_deg": 90},
-    {"kind": "slope", "position": [0.0, -1.5], "angle_deg": 15},
-    {"kind": "box", "position": [0.8, 1.0]},
-    {"kind": "stand", "position": [-0.3, 1.2], "height": 0.4},
-    {"kind": "mat", "position": [0.9, -0.9]},
-    {"kind": "payload", "rests_on": "table", "material": "steel", "size": [0.08, 0.05, 0.03]},
-    {"kind": "payload", "rests_on": "shelf", "board": 2, "mass": 0.1},
-]
-
+ROOM = Path(__file__).resolve().parents[2] / "examples/room.yaml"
 BOX, STAND, SHELF = ({"kind": kind, "position": [2, 0]} for kind in ("box", "stand", "shelf"))
 
 
@@ -55,9 +46,13 @@ def test_the_usual_environment_is_that_of_the_paper():
     assert model.geom("drop_mat").size.tolist() == [0.2, 0.2, 0.01]
 
 
-def test_every_kind_becomes_bodies_and_stays_where_it_stands(tmp_path):
+def test_every_kind_becomes_bodies_and_stays_where_it_stands():
     """Payloads: 0.6 + 0.015 m on the table; second of three boards of 1.2 m: 0.8 + 0.02 m."""
-    model = compiled(tmp_path, EVERY_KIND)
+    room = load_scenario(str(ROOM), S500)
+    assert {one["kind"] for one in room.environment} == {
+        *("stand", "table", "shelf", "wall", "slope", "box", "mat", "payload")
+    }
+    model = Vehicle.of(S500).changed(room.surroundings).compile(0.2)
     data = mujoco.MjData(model)
     for _ in range(250):
         mujoco.mj_step(model, data)
@@ -130,5 +125,5 @@ def test_entries_that_do_not_fit_together_are_refused_by_name(tmp_path, entries,
     assert said in str(error.value)
 
 
-def test_what_touches_does_not_intersect(tmp_path):
-    arm_on_ground.check(S500, scenario(tmp_path, EVERY_KIND))
+def test_what_touches_does_not_intersect():
+    arm_on_ground.check(S500, load_scenario(str(ROOM), S500))
