@@ -6,7 +6,7 @@ import pytest
 
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
 from uam_control.profiles.profile_fit import misfits
-from uam_control.vehicle import load_description
+from uam_control.vehicle import chain_of, load_description
 from uam_lab.flights import flight_settings
 from uam_lab.flights.flight_settings import settings
 from uam_lab.flights.node_options import unread
@@ -52,12 +52,20 @@ def test_the_flights_notes_have_it():
     assert "thrust_max 52 N, the rotors' full thrust is 41.4 N" in note
 
 
-def test_a_flight_with_payload_says_that_the_arms_lengths_are_unknown(monkeypatch):
-    monkeypatch.setattr(flight_settings, "load_description", lambda name: replace(S500, arm=None))
-    note = "s500_arm.yaml has no section arm: the magnet is not steered to the payload"
+def test_a_flight_with_payload_says_that_there_is_no_end_effector(monkeypatch):
+    none = chain_of(S500)._replace(has_hand=0)
+    monkeypatch.setattr(flight_settings, "chain_of", lambda vehicle: none)
+    note = "s500_arm.yaml has no end effector: nothing is steered to the payload"
     assert settings("quick_pick", engine="direct").notes == (note,)
     assert not settings("hover", engine="direct").notes
     assert not settings("quick_pick", engine="direct", payload_mass=0.0).notes
+
+
+def test_the_section_arm_of_older_files_is_named(monkeypatch):
+    older = replace(S500, numbers=S500.numbers | {"arm": {"links": [0.1, 0.14]}})
+    monkeypatch.setattr(flight_settings, "load_description", lambda name: older)
+    (note,) = settings("hover", engine="direct").notes
+    assert note == "s500_arm.yaml: arm: not used, the lengths are those of s500_arm.xml"
 
 
 def test_a_section_that_no_node_reads_is_named():
