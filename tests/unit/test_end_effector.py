@@ -4,6 +4,7 @@ MuJoCo judges the shipped scenarios; an arm of our own with a yaw joint, a chain
 """
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -227,9 +228,9 @@ def test_a_bad_entry_is_refused_in_one_line(tmp_path, entry, reason):
 
 
 def test_a_vehicle_without_a_hand_is_refused(monkeypatch):
-    monkeypatch.setattr("uam_control.vehicle.chain_reader.FACE", "no such site")
+    monkeypatch.setattr("uam_control.vehicle.chain_reader.HANDS", ("no such site",))
     with pytest.raises(ScenarioError, match="the vehicle has no end effector"):
-        load_scenario("ee_circle_010")
+        load_scenario("ee_circle_010", replace(load_description(), end_effector=""))
 
 
 def rows_of_csv(elevation=""):

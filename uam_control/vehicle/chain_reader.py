@@ -41,6 +41,16 @@ def read_chain(model: mujoco.MjModel, joints: tuple[str, ...], end_effector: str
     return _Reader(model, joints).chain(end_effector)
 
 
+def hand_site(model: mujoco.MjModel, end_effector: str) -> int:
+    """Return the number of a site, "" for the first of `HANDS`; -1 if it is not there."""
+    import mujoco
+
+    kind = mujoco.mjtObj.mjOBJ_SITE
+    names = (end_effector,) if end_effector else HANDS
+    found = (mujoco.mj_name2id(model, kind, one) for one in names)
+    return next((site for site in found if site >= 0), -1)
+
+
 class _Reader:
     """A model with every joint at zero; all that it returns is in the base's frame."""
 
@@ -123,7 +133,9 @@ class _Reader:
         none = np.zeros(3)
         found = {"has_hand": 0, "hand_place": none, "hand_turn": np.eye(3), "swing_axis": none}
         found |= {"swing_reach": none, "swing_mass": 0.0, "swing_centre": none}
-        if (site := self._site(end_effector)) < 0:
+        if (site := hand_site(self._model, end_effector)) < 0:
+            if end_effector:
+                raise ValueError(f"no site '{end_effector}'")
             return found
         data = self._data
         place = self._inside(data.site_xpos[site])
@@ -136,16 +148,6 @@ class _Reader:
             found |= {"swing_reach": place - pivot, "swing_mass": mass}
             found["swing_centre"] = centre - pivot if mass else place - pivot
         return found
-
-    def _site(self, name: str) -> int:
-        """Return the end effector's number, -1 without one."""
-        import mujoco
-
-        kind = mujoco.mjtObj.mjOBJ_SITE
-        if name:
-            return self._id(kind, name)
-        found = (mujoco.mj_name2id(self._model, kind, one) for one in HANDS)
-        return next((site for site in found if site >= 0), -1)
 
     def _hinge_of(self, site: int) -> int | None:
         """Return the passive hinge that the site hangs on; mark the bodies below it as SWINGS."""

@@ -12,7 +12,7 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
-from uam_control.vehicle.chain_reader import FACE
+from uam_control.vehicle.chain_reader import hand_site
 from uam_sim_bridge.plant.urdf import BASE_LINK, carried
 from uam_sim_bridge.plant.vehicle import BASE
 
@@ -53,8 +53,8 @@ def frames(model: mujoco.MjModel) -> list[Frame]:
 
 
 def end_effector(model: mujoco.MjModel, site: str) -> list[Frame]:
-    """Return the frame of the end effector, a site ("": see `FACE`); [] without one."""
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site or FACE)
+    """Return the frame of the end effector, a site ("": see `hand_site`); [] without one."""
+    number = hand_site(model, site)
     if number < 0:
         return []
     parent = model.body(model.site_bodyid[number]).name
