@@ -267,18 +267,23 @@ def test_a_base_that_floats_already_stays_one(tmp_path):
     assert made.found[0].startswith("base: base_link")
 
 
-def test_a_range_beside_zero_gets_a_zero_inside(tmp_path):
-    """0 to 2 rad: the zero moves by 1 rad, the range is then -57.29 to 57.29 deg."""
-    text = drone().replace('lower="-1.8" upper="1.9"', 'lower="0" upper="2"', 1)
-    made, model = imported(tmp_path, text)
+def test_a_range_beside_zero_stays(tmp_path):
+    """0.5 to 2 rad; the stowed angle lies within."""
+    text = drone().replace('lower="-1.8" upper="1.9"', 'lower="0.5" upper="2"', 1)
+    made, _ = imported(tmp_path, text)
     first = made.description.joints[0]
-    assert (first.low, first.high) == pytest.approx((-1.0, 1.0), abs=1e-3)
-    assert any("0 here is 1 rad of the file" in line for line in made.missing)
-    here = posed(model, made.description.joint_names, (-1.0, 0.0))
-    tool = here.body("magnet").xpos - here.body("base").xpos
-    assert tool == pytest.approx(
-        (0.02, 0.0, -0.06 - 0.24), abs=1e-3
-    )  # 0 of the file: straight down
+    assert (first.low, first.high) == pytest.approx((0.5, 2.0), abs=1e-3)
+    assert 0.5 < first.stowed < 2.0
+
+
+def test_each_joint_may_have_a_servo_of_its_own(tmp_path):
+    answers = Answers({"servo": "XM540-W150,XM430-W210"})
+    made, model = imported(tmp_path, drone(), answers=answers)
+    assert [one.stall_torque for one in made.description.servos] == [7.3, 3.0]
+    inertias = model.dof_armature[[model.joint(f"joint_{i}").dofadr[0] for i in range(2)]]
+    assert inertias == pytest.approx([0.010 * 7.3 / 3.0, 0.010], rel=1e-3)
+    with pytest.raises(ImportRefused, match="one for all, or 2 with commas"):
+        imported(tmp_path, drone(), answers=Answers({"servo": "XM430-W210," * 2 + "XM430-W210"}))
 
 
 def stl(size):

@@ -72,6 +72,19 @@ class Answers:
             raise ImportRefused(f"answers: {key}: {unknown(str(given), allowed)}")
         return Told(given, ASKED)
 
+    def each(self, key: str, usual: str, why: str, allowed: Mapping[str, Any], count: int) -> Told:
+        """Return `count` of the names `allowed`; an answer is one for all, or all with commas."""
+        given = self._answer(key, usual)
+        if given is None:
+            return Told([usual] * count, ASSUMED, why)
+        names = str(given).split(",")
+        for name in names:
+            if name not in allowed:
+                raise ImportRefused(f"answers: {key}: {unknown(name, allowed)}")
+        if len(names) not in (1, count):
+            raise ImportRefused(f"answers: {key}: {given}: one for all, or {count} with commas")
+        return Told(names * (count // len(names)), ASKED)
+
     def _answer(self, key: str, usual: Any) -> Any:
         if key in self.given or self.ask is None:
             return self.given.get(key)

@@ -20,7 +20,6 @@ from uam_sim_bridge.plant import Vehicle
 
 SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone
 READERS = {"robot": urdf_file.read, "mujoco": mjcf_file.read}
-XM430 = 3.0  # [N m] stall torque of the servo whose friction parts/world.xml has
 
 
 @dataclass(frozen=True)
@@ -56,9 +55,12 @@ def import_vehicle(
         )
     geometry.refuse_far(parts)
     stance = stand(parts, answers)
-    tree_of_numbers = numbers.document(parts, stance, answers, name, arm_of)
-    stall = tree_of_numbers["servos"]["stall_torque"].value
-    model = MjcfText(parts, stance, folder, stall / XM430).write(name)
+    if arm_of is None:
+        servos = numbers.servos_for(parts, answers, numbers.masses(parts))
+    else:
+        servos = numbers.servos_of(arm_of)
+    tree_of_numbers = numbers.document(parts, stance, answers, name, servos)
+    model = MjcfText(parts, stance, folder, servos.stall).write(name)
     tree_of_numbers["mass"].value = _mass(model)
     written = folder / f"{name}.yaml"
     head = f"# {name}: imported from {file.name} by uam vehicle import. SI units, frames FLU.\n"

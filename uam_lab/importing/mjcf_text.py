@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -15,6 +16,7 @@ from uam_lab.importing.standing import Stance
 from uam_lab.importing.structure import OWN, Parts
 
 INCLUDED = ("world.xml", "sensors.xml", "magnet.xml")
+XM430 = 3.0  # [N m] its stall torque; its dynamics are those of parts/world.xml
 WORLD_DYNAMICS = {"armature": 0.010, "damping": 0.02, "frictionloss": 0.08}  # of an XM430-W210
 KINDS = {
     geometry.SHAPES.mjGEOM_SPHERE: ("sphere", 1),
@@ -31,9 +33,10 @@ HIDDEN = "3"  # geom group that is not drawn
 class MjcfText:
     """Writes the MJCF of a vehicle and the parts and meshes that it includes."""
 
-    def __init__(self, parts: Parts, stance: Stance, folder: Path, gear: float) -> None:
-        """gear: stall torque of the servos / that of the XM430-W210."""
-        self.parts, self.stance, self.folder, self.gear = parts, stance, folder, gear
+    def __init__(self, parts: Parts, stance: Stance, folder: Path, stall: Sequence[float]) -> None:
+        """stall (n,) [N m]: stall torque of the servo of each joint."""
+        self.parts, self.stance, self.folder = parts, stance, folder
+        self._gears = dict(zip(parts.joints, np.divide(stall, XM430), strict=True))
         self._assets: dict[str, dict[str, str]] = {}
         self._taken = {"base", *OWN, "magnet_case"}
 
@@ -96,7 +99,7 @@ class MjcfText:
         model, dof = self.parts.model, self.parts.model.jnt_dofadr[joint]
         stated = (model.dof_armature[dof], model.dof_damping[dof], model.dof_frictionloss[dof])
         return {
-            key: f"{value if value > 0.0 else self.gear * usual:.4g}"
+            key: f"{value if value > 0.0 else self._gears[joint] * usual:.4g}"
             for (key, usual), value in zip(WORLD_DYNAMICS.items(), stated, strict=True)
         }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -130,18 +131,30 @@ def _lay_out(parts: Parts, answers: Answers) -> None:
     parts.notes.append(f"rotors: layout {told.value} ({told}), {distance.value:g} m ({distance})")
 
 
-def servos_of(other: VehicleDescription) -> Tree:
-    """Return the section `servos` of the vehicle whose arm was hung."""
-    servos = other.numbers["servos"]
-    return {key: Told(value, DERIVED, f"of {other.name}") for key, value in servos.items()}
+@dataclass
+class Servos:
+    """The servos of the arm. section: `servos` of the YAML file; types: of each joint by name,
+    where they differ, else (); stall (n,) [N m]."""
+
+    section: Tree
+    types: tuple[str, ...]
+    stall: tuple[float, ...]
 
 
-def servo_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
-    """Return the section `servos`: one type that holds the arm outstretched."""
+def servos_of(other: VehicleDescription) -> Servos:
+    """Return the servos of the vehicle whose arm was hung."""
+    document = read_section(other.file, ImportRefused)
+    section = _told(document.mapping("servos"), DERIVED, f"of {other.name}")
+    types = tuple(entry.text("servo", default="") for entry in document.entries("joints"))
+    return Servos(section, types if all(types) else (), tuple(s.stall_torque for s in other.servos))
+
+
+def servos_for(parts: Parts, answers: Answers, mass: float) -> Servos:
+    """Return servos that hold the arm outstretched: one type, unless an answer says others."""
     assumed, types = answers.assumed, servo_types()
     load = MAGNET_MASS + assumed.number("payload_share") * mass
-    need = float(geometry.holding_torques(parts, load, GRAVITY).max())
-    share = assumed.number("servo_share")
+    needs = geometry.holding_torques(parts, load, GRAVITY)
+    need, share = float(needs.max()), assumed.number("servo_share")
     fitting = [
         name
         for name, one in types.items()
@@ -149,25 +162,45 @@ def servo_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     ]
     usual = fitting[0] if fitting else list(types)[-1]
     why = f"the smallest that holds {need:.2f} N m with {share:.0%} of its stall torque"
-    told = answers.name("servo", usual, why, types)
-    if types[told.value]["stall_torque"] < need:
-        name = parts.model.joint(parts.joints[0]).name
-        text = f"outstretched the arm needs {need:.2f} N m, {told.value} has less"
-        parts.notes.append(f"joint {name}: {text}")
-    stall = types[told.value]["stall_torque"]
+    told = answers.each("servo", usual, why, types, len(parts.joints))
+    stall = tuple(types[name]["stall_torque"] for name in told.value)
+    for joint, name, needed, most in zip(parts.joints, told.value, needs, stall, strict=True):
+        if most < needed:
+            text = f"outstretched it needs {needed:.2f} N m, a {name} has less"
+            parts.notes.append(f"joint {parts.model.joint(joint).name}: {text}")
+    sections = {
+        name: _servo(parts, answers, Told(name, told.origin, told.reason), need)
+        for name in dict.fromkeys(told.value)
+    }
+    if len(sections) == 1:
+        return Servos(*sections.values(), (), stall)
+    return Servos(sections, tuple(told.value), stall)
+
+
+def _servo(parts: Parts, answers: Answers, kind: Told, need: float) -> Tree:
+    """Return the numbers of one type; need [N m]: largest holding torque of the arm."""
+    numbers = servo_types()[kind.value]
+    stall = numbers["stall_torque"]
+    which = ", ".join(filter(None, (f"type {kind.value}", kind.reason)))
+    found = _told(numbers, kind.origin, which)
+    share = answers.assumed.number("effort_share")
+    found["effort_limit"] = Told(round(share * stall, 3), DERIVED, "from the stall torque")
     stated = [parts.facts(joint).effort for joint in parts.joints]
-    effort = Told(
-        round(assumed.number("effort_share") * stall, 3), DERIVED, "from the stall torque"
-    )
-    if stated and all(need <= one <= stall for one in stated):
-        effort = Told(min(stated), FILE, "smallest effort limit")
-    usual_servo = read_section(configuration.path(USUAL), ImportRefused).section("servos")
-    which = ", ".join(filter(None, (f"type {told.value}", told.reason)))
-    found: Tree = {k: Told(v, told.origin, which) for k, v in types[told.value].items()}
-    found["effort_limit"] = effort
-    for key in ("position_p_gain", "pwm_limit", "command_latency_ticks"):
-        found[key] = Told(usual_servo.entry(key), ASSUMED, "as of the S-500")
-    return found
+    if all(need <= one <= stall for one in stated):
+        found["effort_limit"] = Told(min(stated), FILE, "smallest effort limit")
+    usual = read_section(configuration.path(USUAL), ImportRefused).mapping("servos")
+    common = ("position_p_gain", "pwm_limit", "command_latency_ticks")
+    return found | _told({key: usual[key] for key in common}, ASSUMED, "as of the S-500")
+
+
+def _told(values: dict[str, Any], origin: str, reason: str = "") -> Tree:
+    """Return numbers of one origin."""
+    return {
+        key: _told(value, origin, reason)
+        if isinstance(value, dict)
+        else Told(value, origin, reason)
+        for key, value in values.items()
+    }
 
 
 def document(
@@ -175,16 +208,15 @@ def document(
     stance: Stance,
     answers: Answers,
     name: str,
-    arm_of: VehicleDescription | None = None,
+    servos: Servos,
 ) -> Tree:
     """Return the content of the YAML file; the mass is that of the links and the magnet."""
     mass = masses(parts) + MAGNET_MASS
     usual = read_section(configuration.path(USUAL), ImportRefused)
-    servos = servo_numbers(parts, answers, mass) if arm_of is None else servos_of(arm_of)
     drag = [round(mass * one, 3) for one in answers.assumed.numbers("drag_per_mass", 3)]
-    air = {key: Told(value, ASSUMED) for key, value in usual.mapping("air").items()}
+    air = _told(usual.mapping("air"), ASSUMED)
     air["drag"] = Told(drag, ASSUMED, "by the mass")
-    magnet = {key: Told(value, ASSUMED) for key, value in usual.mapping("magnet").items()}
+    magnet = _told(usual.mapping("magnet"), ASSUMED)
     magnet["holding_force"] = answers.number(
         "magnet.holding_force", magnet["holding_force"].value, "as of the S-500"
     )
@@ -202,18 +234,12 @@ def document(
                 "range_deg": stance.ranges[i],
                 "stowed_deg": stance.stowed[i],
             }
+            | ({"servo": servos.types[i]} if servos.types else {})
             for i, joint in enumerate(parts.joints)
         ],
-        "servos": servos,
+        "servos": servos.section,
         "air": air,
-        "sensors": _assumed(usual.mapping("sensors")),
-        "variation": _assumed(usual.mapping("variation")),
+        "sensors": _told(usual.mapping("sensors"), ASSUMED),
+        "variation": _told(usual.mapping("variation"), ASSUMED),
         "magnet": magnet,
-    }
-
-
-def _assumed(values: dict[str, Any]) -> Tree:
-    return {
-        key: _assumed(value) if isinstance(value, dict) else Told(value, ASSUMED)
-        for key, value in values.items()
     }

@@ -1,4 +1,4 @@
-"""How the vehicle stands: zeros and ranges of the joints, the stowed arm, and the feet."""
+"""How the vehicle stands: ranges of the joints, the stowed arm, and the feet."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from uam_lab.importing import geometry
 from uam_lab.importing.answers import ASSUMED, DERIVED, FILE, Answers, Told
 from uam_lab.importing.structure import Parts
 
-NARROW = 0.5  # [rad] to the nearer end of a joint's range, below which its zero is moved
-LEAST = 0.1  # [rad] as `loading.LEAST_RANGE`
+LEAST = 0.2  # [rad] smallest range of a joint, see `loading.LEAST_RANGE`
 FOOT = 0.012  # [m] radius of a foot: class foot of parts/world.xml
 LOW = 0.015  # [m] above the lowest point: a shape of the base there is one to stand on
 FACE = 0.045  # [m] from the magnet's pivot to the edge of its face
@@ -24,10 +23,9 @@ MOST_POSES = 3000
 
 @dataclass
 class Stance:
-    """zeros (n,) [rad]: angles of the file that are the vehicle's zeros; ranges, stowed [deg];
-    feet (4, 3) [m]: in the base's frame; legs: whether they are added; height [m]: of the base."""
+    """ranges, stowed [deg]; feet (4, 3) [m]: in the base's frame; legs: whether they are added;
+    height [m]: of the base."""
 
-    zeros: np.ndarray
     ranges: list[Told]
     stowed: list[Told]
     feet: np.ndarray
@@ -36,12 +34,12 @@ class Stance:
 
 
 def stand(parts: Parts, answers: Answers) -> Stance:
-    """Return how the vehicle stands; the model is left with all joints at their zeros."""
-    zeros, ranges = _ranges(parts, answers)
+    """Return how the vehicle stands; the model is left with all joints at zero."""
+    zeros, ranges = np.zeros(len(parts.joints)), _ranges(parts, answers)
     geometry.set_angles(parts, zeros)
     feet, low = _feet(parts)
     clearance = answers.assumed.number("clearance")
-    angles, bottom = _stow(parts, zeros, ranges, low, clearance)
+    angles, bottom = _stow(parts, ranges, low, clearance)
     legs = Told(False, FILE, "lowest shapes of the base")
     gap = bottom - low
     if feet is None or gap < clearance:
@@ -53,33 +51,23 @@ def stand(parts: Parts, answers: Answers) -> Stance:
     why = f"the arm is {1e3 * (bottom - low):.0f} mm above the feet"
     stowed = [Told(round(math.degrees(a), 1), DERIVED, why) for a in angles]
     geometry.set_angles(parts, zeros)
-    return Stance(zeros, ranges, stowed, feet, legs, 0.005 - low)
+    return Stance(ranges, stowed, feet, legs, 0.005 - low)
 
 
-def _ranges(parts: Parts, answers: Answers) -> tuple[np.ndarray, list[Told]]:
-    """Return zeros (n,) [rad] and ranges [deg] of the joints."""
-    model = parts.model
+def _ranges(parts: Parts, answers: Answers) -> list[Told]:
+    """Return the ranges [deg] of the joints, at most half a turn to either side."""
+    model, ranges = parts.model, []
     endless = math.radians(answers.assumed.number("endless_joint"))
-    zeros, ranges = np.zeros(len(parts.joints)), []
-    for i, joint in enumerate(parts.joints):
-        low, high = map(float, model.jnt_range[joint])
-        name, limited = model.joint(joint).name, bool(model.jnt_limited[joint])
-        if not limited:
-            low, high = -endless, endless
-        if high - low < 2.0 * LEAST:
-            text = f"its range of {high - low:.3g} rad is below {2.0 * LEAST:g} rad"
-            raise parts.source.error("joint", name, text)
+    for joint in parts.joints:
+        limited = bool(model.jnt_limited[joint])
+        given = model.jnt_range[joint] if limited else (-endless, endless)
+        low, high = np.clip(given, -math.pi, math.pi)
+        if high - low < LEAST:
+            text = f"its range of {high - low:.3g} rad is below {LEAST:g} rad"
+            raise parts.source.error("joint", model.joint(joint).name, text)
         origin = (FILE, "") if limited else (ASSUMED, "the file has no limits")
-        nearer = min(-low, high)
-        if nearer < LEAST or nearer < min(NARROW, 0.25 * (high - low)):
-            zeros[i] = round(0.5 * (low + high), 3)
-            moved = f"0 here is {zeros[i]:g} rad of the file: the range must have 0 inside"
-            origin = (DERIVED, moved)
-            parts.notes.append(f"joint {name}: {moved}")
-        limits = [low - zeros[i], high - zeros[i]]
-        limits = [max(-math.pi, limits[0]), min(math.pi, limits[1])]
-        ranges.append(Told([_rounded(math.degrees(one)) for one in limits], *origin))
-    return zeros, ranges
+        ranges.append(Told([_rounded(math.degrees(one)) for one in (low, high)], *origin))
+    return ranges
 
 
 def _rounded(angle: float) -> float:
@@ -122,14 +110,14 @@ def _added_feet(parts: Parts, answers: Answers, low: float) -> np.ndarray:
 
 
 def _stow(
-    parts: Parts, zeros: np.ndarray, ranges: list[Told], low: float, clearance: float
+    parts: Parts, ranges: list[Told], low: float, clearance: float
 ) -> tuple[np.ndarray, float]:
     """Return the joint angles (n,) [rad] in which the arm stays above the feet with little motion
     from zero, and the arm's lowest point [m] there; without such, those of the highest arm."""
-    choices = [
-        [math.radians(a) for a in STEPS_DEG if r.value[0] + 5.0 <= a <= r.value[1] - 5.0] or [0.0]
-        for r in ranges
-    ]
+    choices = []
+    for low_deg, high_deg in (one.value for one in ranges):
+        inside = [a for a in STEPS_DEG if low_deg + 5.0 <= a <= high_deg - 5.0]
+        choices.append(np.radians(inside or [0.5 * (low_deg + high_deg)]))
     poses = list(itertools.islice(itertools.product(*choices), 200_000))
     poses.sort(key=lambda pose: sum(map(abs, pose)))
     if len(poses) > MOST_POSES:
@@ -137,13 +125,13 @@ def _stow(
     boxes = _boxes(parts)
     best, highest = np.zeros(len(ranges)), -math.inf
     for pose in poses:
-        geometry.set_angles(parts, zeros + pose)
+        geometry.set_angles(parts, np.array(pose))
         bottom = _bottom(parts, boxes)
         if bottom - low >= clearance:
             return np.array(pose), bottom
         if bottom > highest + 0.005:
             best, highest = np.array(pose), bottom
-    geometry.set_angles(parts, zeros + best)
+    geometry.set_angles(parts, best)
     return best, highest
 
 
