@@ -1,17 +1,21 @@
 """A node that measures its ticks, on the cores that it may use."""
 
 import os
+import socket
 from pathlib import Path
 
 import numpy as np
+from free_port import free_port
 
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.stamps import SECOND
 from uam_lab.experiments.budget.path import tick_path
+from uam_lab.flights.ros.node_arguments import FUSED
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node import wiring
 from uam_msgs_py.node.tick_times import PARTS, read_tick_times
 
 MODULE, NAME = "uam_control.nodes.position_controller", "position_controller"
@@ -78,37 +82,32 @@ def test_a_node_that_polls_answers_every_tick(start, probe):
 
 
 def test_nodes_of_one_process_share_its_ticks(start, probe, tmp_path):
-    inside = ("state_estimator", "position_controller")
-    absent = "mission,attitude_controller,arm_controller,mavlink_bridge"
-    words = ["-p", f"flight_controller:without:={absent}"]
-    for name in ("flight_controller", *inside):
+    every = (wiring.FLIGHT_CONTROLLER, *wiring.FUSED)
+    words = ["-p", f"{wiring.BRIDGE}:local_port:={free_port(socket.SOCK_DGRAM)}"]
+    for name in every:
         words += ["-p", f"{name}:tick_times:={tmp_path / name}.npz"]
-    node = start("uam_sim_bridge.nodes.flight_controller", "--ros-args", *words)
-    sensors = [topics.MOCAP, topics.JOINTS, topics.IMU]
-    mocap, joints, imu, reference = map(probe.publisher, (*sensors, topics.REFERENCE))
-    answers = probe.collect(topics.POSITION_COMMAND)
-    probe.until_connected("state_estimator", [mocap, joints, imu])
-    probe.until_connected(NAME, [reference], [topics.POSITION_COMMAND])
+    node = start(FUSED, "--ros-args", *words)
+    mocap, joints, imu = map(probe.publisher, (topics.MOCAP, topics.JOINTS, topics.IMU))
+    answers = probe.collect(topics.SETPOINT)
+    probe.until_connected(wiring.ESTIMATOR, [mocap, joints, imu])
+    probe.until_connected(wiring.BRIDGE, [], [topics.SETPOINT])
     pose, angles, samples = PoseWriter(), JointStateWriter(arm_coordinates(2)), ImuWriter()
-    desired, rows = ReferenceWriter(2), np.zeros((3, 8))
     level, gravity = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81])
     for tick in range(1, TICKS + 1):
         stamp = tick * PERIOD
-        reference.publish(desired.fill(stamp, rows, True, 0))
         mocap.publish(pose.fill(stamp, np.zeros(3), level))
         joints.publish(angles.stamped(stamp))
         imu.publish(samples.fill(stamp, np.zeros(3), gravity))
         probe.until(lambda tick=tick: len(answers) == tick, "answer")
     assert node.interrupt() == 0
-    every = ("flight_controller", *inside)
     measured = {one: read_tick_times(tmp_path / f"{one}.npz") for one in every}
-    path = tick_path(("flight_controller",), measured, inside)
+    path = tick_path((wiring.FLIGHT_CONTROLLER,), measured, wiring.FUSED)
     assert len(path.stamps) > TICKS // 2
     process, *nodes = np.moveaxis(path.times, 1, 0)
     assert (process[:, 1] > 0.0).all()  # take
     for times in nodes:
         assert (times[:, 0] == 0.0).all() and (times[:, 3] > 0.0).all()  # no wake-up, a stage
-    columns = measured["flight_controller"]
+    columns = measured[wiring.FLIGHT_CONTROLLER]
     rows = np.isin(columns["stamp"], path.stamps)
     whole = 1e-6 * (columns["sent"] - columns["woken"])[rows]
     np.testing.assert_allclose(path.totals, whole, atol=1e-6)

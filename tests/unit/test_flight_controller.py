@@ -1,53 +1,14 @@
-"""The fused layout: its nodes, their order, its settings."""
+"""The fused layout: its settings."""
 
 import pytest
 
 pytest.importorskip("rclpy")
 
-from uam_control.stages.control_tick import STAGES
 from uam_lab.flights import flight_settings
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.flights.ros import node_arguments
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.tick_times import NoTickTimes
-from uam_sim_bridge.nodes import flight_controller
-
-
-def test_every_stage_of_the_tick_has_its_node():
-    assert list(flight_controller.ACTS) == [stage.name for stage in STAGES]
-    acting = [act[0] for act in flight_controller.ACTS.values() if act]
-    assert tuple(dict.fromkeys(acting)) == wiring.FUSED == tuple(flight_controller.KINDS)
-    for act in filter(None, flight_controller.ACTS.values()):
-        assert callable(getattr(flight_controller.KINDS[act[0]], act[1]))
-
-
-class Acting:
-    """A node that notes what it does."""
-
-    def __init__(self, name, log):
-        self.name, self.log, self.delivery, self.times = name, log, self, NoTickTimes()
-        self.settle, self.begin_ticks, self.look_ahead, self.send_answers, self.send = (
-            lambda act=act: log.append((name, act))
-            for act in ("settle", "begin_ticks", "look_ahead", "send_answers", "send")
-        )
-
-    def get_name(self):
-        return self.name
-
-
-@pytest.mark.parametrize("absent", ["", *wiring.FUSED])
-def test_a_pass_has_the_order_of_the_stages_and_sends_after_the_bridge(absent):
-    log = []
-    process = Acting("process", log)
-    nodes = [Acting(name, log) for name in wiring.FUSED if name != absent]
-    for step in flight_controller.steps([process, *nodes]):
-        step()
-    acts = [act for act in flight_controller.ACTS.values() if act]
-    bridge = acts.index((wiring.BRIDGE, "settle"))
-    expected = [*acts[: bridge + 1], ("process", "send_answers"), *acts[bridge + 1 :]]
-    expected.append(("process", "send"))
-    assert log == [(name, act) for name, act in expected if name != absent]
 
 
 def settings(**given):

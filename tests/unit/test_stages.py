@@ -173,13 +173,15 @@ def test_messages_of_stages_are_read_as_those_of_other_processes():
 
 def test_the_mission_makes_the_reference_of_the_next_tick():
     stage, state = mission_stage(), np.zeros((3, 8))
-    assert stage.begin(0, state)  # the first one has to be made
+    stage.begin(0, state)
+    assert stage.anew  # the first one has to be made
     stage.advance(0, state)
     assert stage.ahead == PERIOD
-    assert not stage.begin(PERIOD, state)
+    stage.begin(PERIOD, state)
+    assert not stage.anew
     stage.advance(PERIOD, state)
-    assert stage.begin(12 * PERIOD, state)  # after a long gap as well
-    assert stage.ahead == 12 * PERIOD
+    stage.begin(12 * PERIOD, state)  # after a long gap as well
+    assert stage.anew and stage.ahead == 12 * PERIOD
 
 
 @pytest.mark.parametrize("step", [0.8, 1.2, 2.0, 10.0])
@@ -190,7 +192,8 @@ def test_each_tick_has_one_reference_carried_to_its_stamp(step):
     reference = stage.output.reference
     reference[:] = np.arange(24.0).reshape(3, 8)
     stamp = round(step * PERIOD)
-    assert not stage.begin(stamp, state) and stage.ahead == PERIOD
+    stage.begin(stamp, state)
+    assert not stage.anew and stage.ahead == PERIOD
     late = (stamp - PERIOD) * 1e-9
     position, velocity, acceleration = reference
     expected = position + late * velocity + late**2 / 2 * acceleration

@@ -10,10 +10,9 @@ from uam_control.nodes.controller_node import ControllerNode
 from uam_control.stages.hand_stage import HandStage
 from uam_control.vehicle import POSITION_SERVO
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import Reference, TorqueWriter
+from uam_msgs_py.messages.control import TorqueWriter
 from uam_msgs_py.messages.convert import JointCommandWriter
 from uam_msgs_py.node.base_node import run
-from uam_msgs_py.node.local_delivery import LocalDelivery
 
 NAME = "arm_controller"
 
@@ -21,30 +20,31 @@ NAME = "arm_controller"
 class ArmControllerNode(ControllerNode):
     """Publishes the servos' commands, one message per state, on the ground as well."""
 
-    def __init__(self, delivery: LocalDelivery | None = None):
-        last = topics.POSITION_COMMAND
-        super().__init__(NAME, ArmController, topics.ARM_ADAPTATION, last, delivery)
+    def __init__(self):
+        own = topics.ARM_COMMAND, topics.ARM_ADAPTATION
+        super().__init__(NAME, ArmController, *own, last=topics.POSITION_COMMAND)
         names = list(self.vehicle.coordinates[ARM])
         parameters, period = self.parameter_set.current, self.vehicle.control_period
-        self._hand = HandStage(parameters, period, len(names), self.vehicle)
+        self.hand = HandStage(parameters, period, len(names), self.vehicle)
         self.parameter_set.apply = self._configure
         to_goals = self.parameter_set.current.setpoint == POSITION_SERVO
         outlets = [self.publisher(topic) for topic in (topics.ARM_EFFORT, topics.ARM_GOALS)]
         self._servos = outlets[to_goals]
-        self._command = self.publisher(topics.ARM_COMMAND)
         self._servo_writer = JointCommandWriter(len(names))
         self._writer = TorqueWriter(names)
 
     def _configure(self, parameters: ArmLimits) -> None:
         self.controller.set_parameters(parameters)
-        self._hand.configure(parameters)
+        self.hand.configure(parameters)
 
     def reference_of(self, state: np.ndarray, reference: np.ndarray, flying: bool) -> np.ndarray:
-        return self._hand.update(state, reference, flying, self.controller.saturated)
+        return self.hand.update(state, reference, flying, self.controller.saturated)
 
-    def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
+    def answer(self) -> None:
         self._servos.publish(self._servo_writer.fill(self.controller.command))
-        self._command.publish(self._writer.fill(stamp, tau))
+
+    def command(self, stamp: int, tau: np.ndarray, reference: np.ndarray, flying: bool) -> bytes:
+        return self._writer.fill(stamp, tau)
 
 
 def main() -> int:

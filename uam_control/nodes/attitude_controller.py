@@ -9,10 +9,9 @@ from uam_control.control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
 from uam_control.stages.law_stages import MeasuredDelay
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import ATTITUDE_NAMES, Reference, TorqueWriter
+from uam_msgs_py.messages.control import ATTITUDE_NAMES, TorqueWriter
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import run
-from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 
 NAME = "attitude_controller"
@@ -21,12 +20,11 @@ NAME = "attitude_controller"
 class AttitudeControllerNode(ControllerNode):
     """Publishes /uam/attitude/command, empty while not flying."""
 
-    def __init__(self, delivery: LocalDelivery | None = None):
-        last = topics.POSITION_COMMAND
-        super().__init__(NAME, AttitudeController, topics.ATTITUDE_ADAPTATION, last, delivery)
+    def __init__(self):
+        own = topics.ATTITUDE_COMMAND, topics.ATTITUDE_ADAPTATION
+        super().__init__(NAME, AttitudeController, *own, last=topics.POSITION_COMMAND)
         self._measured = MeasuredDelay(self.controller)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
-        self._command = self.publisher(topics.ATTITUDE_COMMAND)
         self._writer = TorqueWriter(ATTITUDE_NAMES, frame(self, topics.BODY))
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
@@ -37,8 +35,8 @@ class AttitudeControllerNode(ControllerNode):
         self._measured.apply(stamp)
         super()._joined(stamp, *inputs)
 
-    def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
-        self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))
+    def command(self, stamp: int, tau: np.ndarray, reference: np.ndarray, flying: bool) -> bytes:
+        return self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp)
 
 
 def main() -> int:

@@ -31,7 +31,6 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.joins import Ahead, StampJoin
-from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
@@ -45,12 +44,12 @@ class ControllerNode(UamNode):
         self,
         name: str,
         controller: type[Controller],
+        command: Topic,
         adaptation: Topic,
         last: Topic,
-        delivery: LocalDelivery | None = None,
     ):
         """last: the topic whose message completes a tick; the reference arrives a tick ahead."""
-        super().__init__(name, delivery)
+        super().__init__(name)
         law = given(self).get("law", catalogue.DEFAULT)
         self.vehicle = described_vehicle(self)
         kind, axes = parameter_set(name, {"law": law}, self.vehicle)
@@ -67,7 +66,7 @@ class ControllerNode(UamNode):
         spare = LawStage(controller(self.parameter_set.current), timing)
         for flying in (False, True):  # compiles the law: the first call takes a second
             spare.update(0, nothing, nothing, *attitude, flying)
-        self._adaptation = self.publisher(adaptation)
+        self._command, self._adaptation = self.publisher(command), self.publisher(adaptation)
         self._gains = JointStateWriter(self.controller.names)
         inputs = [topics.STATE, topics.REFERENCE]
         inputs += [] if last in inputs else [last]
@@ -104,18 +103,29 @@ class ControllerNode(UamNode):
         wanted = self.reference_of(state, reference.values, flying)
         tau = self.stage.update(stamp, state, wanted, *attitude, flying)
         self.times.lap(STAGE)
-        self.send(stamp, tau, reference, flying)
+        self.answer()
+        self.send(stamp, tau, reference.values, flying)
+        self.done_tick(stamp, begun)
+
+    def answer(self) -> None:
+        """Publish what the plant waits for, of the tick done last."""
+
+    def send(self, stamp: int, tau: np.ndarray, reference: np.ndarray, flying: bool) -> None:
+        """Publish the command of the tick `stamp` [ns], and the adapted gains if they are due.
+
+        tau: see `update` of the controller; reference (3, 6 + n): of the mission.
+        """
+        self._command.publish(self.command(stamp, tau, reference, flying))
         if self.stage.gains_due:
             self._gains.position[:] = self.controller.adaptation
             self._adaptation.publish(self._gains.stamped(stamp))
-        self.done_tick(stamp, begun)
 
     def reference_of(self, state: np.ndarray, reference: np.ndarray, flying: bool) -> np.ndarray:
         """Return the reference (3, 6 + n) of the law, from that of the mission."""
         return reference
 
-    def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
-        """Publish the command of the tick `stamp` [ns]; tau: see `update` of the controller."""
+    def command(self, stamp: int, tau: np.ndarray, reference: np.ndarray, flying: bool) -> bytes:
+        """Return the message of a command; see `send`."""
         raise NotImplementedError
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -58,7 +58,6 @@ from uam_msgs_py.messages.status import (
 )
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
-from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import neighbour_section
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, ENCODE, STAGE
@@ -93,8 +92,8 @@ class MissionNode(UamNode):
     reference of its tick.
     """
 
-    def __init__(self, delivery: LocalDelivery | None = None):
-        super().__init__(NAME, delivery)
+    def __init__(self):
+        super().__init__(NAME)
         vehicle = described_vehicle(self)
         profile = default_profile(DEFAULT, vehicle)
         derived = derived_parameters(vehicle)[NAME] | self._reference_limits(profile)
@@ -107,7 +106,7 @@ class MissionNode(UamNode):
         start = NodeParameters(self, StartParameters, read_only=True).current
         self._has_clock = start.autopilot_has_clock
         self._mission = Mission(scenario, self.parameter_set.current, start, vehicle)
-        self._stage = MissionStage(self._mission, timing)
+        self.stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
         warm_up(spare, self.parameter_set.current.takeoff_delay, timing.control_period)
         self.parameter_set.apply = self._mission.configure
@@ -116,7 +115,6 @@ class MissionNode(UamNode):
         self._due = 0  # stamp [ns] of the next status
         self._held_back = False  # whether a limit prevents the take-off
         self._states = Backlog()
-        self._begun: tuple[int, np.ndarray, float] | None = None  # tick: stamp, state, wall time
         self._state_timeout = NodeParameters(self, StateWatch, read_only=True).current.state_timeout
         self._state_at = math.inf  # [s] time.monotonic() of the newest state
         if self._state_timeout:
@@ -134,8 +132,8 @@ class MissionNode(UamNode):
         self._path_of = ""  # the plan that was published, see _publish_path
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
-        self._errors = TrackingErrors(self)
-        MissionInputs(self, self._stage.inputs, vehicle.joint_names)
+        self.errors = TrackingErrors(self)
+        MissionInputs(self, self.stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         if start.require_checklist:
             self.listen(topics.CHECKLIST, self._on_checklist, required=False)
@@ -177,7 +175,7 @@ class MissionNode(UamNode):
         authority = Authority(
             state.released_to, state.landed, state.lands, state.failed, state.stopped
         )
-        self._stage.autopilot(
+        self.stage.autopilot(
             stamp, state.connected, since, state.round_trip, state.loop_delay, authority
         )
 
@@ -197,52 +195,47 @@ class MissionNode(UamNode):
 
     def _on_state(self, data: bytes) -> None:
         self._states.put(read_state(data, self._joints))
-        self._state_at = time.monotonic()
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        self.begin_ticks()
-        self.look_ahead()
-
-    def begin_ticks(self) -> None:
-        """Begin the ticks of the states that have arrived; `look_ahead` ends the last one."""
         for stamp, state in self._states.take():
-            self.look_ahead()
-            self._begin_tick(stamp, state)
+            begun = time.perf_counter()
+            self.times.lap(DECODE)
+            self.note_time(stamp)
+            self.stage.begin(stamp, state)
+            self.times.lap(STAGE)
+            self.tell(stamp, state)
+            self.answer()
+            self.times.lap(ENCODE)
+            self.stage.advance(stamp, state)
+            self.times.lap(STAGE)
+            self.send()
+            self.done_tick(stamp, begun)
 
-    def _begin_tick(self, stamp: int, state: np.ndarray) -> None:
-        """Publish status and magnet of the tick `stamp` [ns]."""
-        begun, stage = time.perf_counter(), self._stage
-        self.times.lap(DECODE)
+    def note_time(self, stamp: int) -> None:
+        """Compare the tick `stamp` [ns] that begins with the wall clock, if stamps are not its."""
         if self._has_clock:
-            stage.inputs.inputs.wall_clock(stamp / SECOND, time.monotonic())
-        changed = stage.begin(stamp, state)
-        self.times.lap(STAGE)
-        if changed:
-            self._publish_reference()
-        output = stage.output
-        self._errors.tick(stamp, state, stage.reference, output.flying)
-        self._publish_status(
-            stamp
-        )  # before the magnet, so that the status of a tick arrives before it
-        self._magnet.publish(SWITCH[bool(output.magnet)])
-        self.times.lap(ENCODE)
-        self._begun = stamp, state, begun
+            self.stage.inputs.inputs.wall_clock(stamp / SECOND, time.monotonic())
 
-    def look_ahead(self) -> None:
-        """End the tick that has begun, if any: publish the reference of the next one."""
-        if self._begun is None:
-            return
-        (stamp, state, begun), self._begun = self._begun, None
-        self._stage.advance(stamp, state)
-        self.times.lap(STAGE)
-        self._publish_reference()
-        self.done_tick(stamp, begun)
+    def tell(self, stamp: int, state: np.ndarray) -> None:
+        """Publish the status of the tick `stamp` [ns] that has begun, state (3, 6 + n).
 
-    def _publish_reference(self) -> None:
+        Before `answer`, so that the status of a tick arrives before the magnet.
+        """
+        self._state_at = time.monotonic()
+        if self.stage.anew:
+            self.send()
+        self.errors.tick(stamp, state, self.stage.reference, self.stage.output.flying)
+        self._publish_status(stamp)
+
+    def answer(self) -> None:
+        """Publish the magnet, for which the plant waits."""
+        self._magnet.publish(SWITCH[bool(self.stage.output.magnet)])
+
+    def send(self) -> None:
         """Publish the newest reference, with the stamp of its tick."""
-        stage, output = self._stage, self._stage.output
+        stage, output = self.stage, self.stage.output
         since_takeoff = max(0, round(output.time * SECOND))
         self._reference.publish(
             self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
@@ -278,11 +271,11 @@ class MissionNode(UamNode):
     @property
     def status(self) -> MissionStatus:
         """Phase, errors and state of the mission at the newest tick."""
-        output, errors = self._mission.output, self._errors.newest()
+        output, errors = self._mission.output, self.errors.newest()
         late = self._mission.setpoint_delay
         return MissionStatus(
             output.phase,
-            self._stage.time,
+            self.stage.time,
             errors.position,
             errors.attitude,
             errors.arm,
@@ -309,7 +302,7 @@ class MissionNode(UamNode):
 
         After a change, and once half of a path is flown.
         """
-        part = int(2.0 * self._stage.time / PATH_LENGTH)
+        part = int(2.0 * self.stage.time / PATH_LENGTH)
         mission = self._mission
         plan = f"{len(mission.changes)} {mission.plans_flown} {mission.output.state} {part}"
         if plan != self._path_of and self._path.get_subscription_count():
@@ -351,7 +344,7 @@ class MissionNode(UamNode):
         output, beyond = self._mission.output, self._mission.beyond
         odd = output.state in (State.HOLDING, State.RELEASED)
         limits, delay = self.parameter_set.current, self._mission.setpoint_delay
-        slower, late = self._stage.inputs.readings.slower, ""
+        slower, late = self.stage.inputs.readings.slower, ""
         if delay > limits.delay_warn * limits.delay_margin:
             share = 100.0 * margin_left(delay, limits)
             late = f"setpoints {1e3 * delay:.0f} ms late: {share:.0f} % of the delay margin left"

@@ -3,7 +3,8 @@
 The desired attitude is the position law's, from /uam/position/command. At the end of a tick its
 command may not have arrived yet, so the errors are those of the tick DELAY before: in lockstep its
 messages have then arrived, and the same flight gives the same numbers. The messages stay
-serialized; only the one that belongs to a status, twice a second, is read.
+serialized; only the one that belongs to a status, twice a second, is read. Within a process
+`note_desired` gives the desired attitude itself.
 """
 
 from collections import deque
@@ -40,11 +41,15 @@ class TrackingErrors:
 
     def __init__(self, node: UamNode) -> None:
         self._ticks: deque[tuple[int, np.ndarray, np.ndarray, bool]] = deque(maxlen=STORED)
-        self._commands: deque[tuple[int, bytes]] = deque(maxlen=STORED)
+        self._commands: deque[tuple[int, bytes | np.ndarray | None]] = deque(maxlen=STORED)
         node.listen(topics.POSITION_COMMAND, self._on_command, required=False)
 
     def _on_command(self, data: bytes) -> None:
         self._commands.append((stamp_of(data), data))
+
+    def note_desired(self, stamp: int, attitude: np.ndarray | None) -> None:
+        """Store q_d (3,) [rad] of a tick, None while not flying, in place of its command."""
+        self._commands.append((stamp, attitude))
 
     def tick(self, stamp: int, state: np.ndarray, reference: np.ndarray, flying: bool) -> None:
         """Store a tick: stamp [ns]; state, reference (3, 6 + n), see `coordinates`."""
@@ -70,8 +75,8 @@ class TrackingErrors:
     def _desired_attitude(self, stamp: int) -> np.ndarray | None:
         """Return q_d (3,) [rad] of the command with this stamp [ns], None without one."""
         data = next((data for at, data in self._commands if at == stamp), None)
-        if data is None:
-            return None
+        if not isinstance(data, bytes):
+            return data
         try:
             _, command = read_position_command(data)
         except BadMessage:  # the controllers, which act on it, report it

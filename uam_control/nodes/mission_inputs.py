@@ -12,9 +12,8 @@ from sensor_msgs.msg import BatteryState, Temperature
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_imu, read_pose, read_values
+from uam_msgs_py.messages.convert import read_efforts, read_imu, read_pose, read_values
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
-from uam_msgs_py.messages.serialized import check_names
 from uam_msgs_py.node.base_node import UamNode
 
 GAINS = (
@@ -75,12 +74,7 @@ class MissionInputs:
         self._inputs.accelerometer_bias(stamp / SECOND, accelerometer)
 
     def _on_joints(self, data: bytes) -> None:
-        stamp, names, effort = read_values(data, "effort")
-        if names != self._names:
-            try:
-                effort = effort[[names.index(name) for name in self._names]]
-            except ValueError:
-                check_names(names, self._names)
+        stamp, effort = read_efforts(data, self._names)
         self._inputs.joints(stamp / SECOND, effort)
 
     def _on_battery(self, message: BatteryState) -> None:

@@ -2,7 +2,9 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,13 +25,13 @@ from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
-from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 NAME = "state_estimator"
 POSES = 100  # of which the interval is measured
+T = TypeVar("T")
 DIVERGED = "the estimate has diverged: no state for 1 s; look at the rates of IMU, poses and joints"
 
 
@@ -49,8 +51,8 @@ class StateEstimatorNode(UamNode):
     samples of the tick have then arrived, and a repeated flight uses the same samples.
     """
 
-    def __init__(self, delivery: LocalDelivery | None = None):
-        super().__init__(NAME, delivery)
+    def __init__(self):
+        super().__init__(NAME)
         vehicle = described_vehicle(self)
         self._names = list(vehicle.joint_names)
         choice = {name: value for name, value in given(self).items() if name == "estimator"}
@@ -59,8 +61,8 @@ class StateEstimatorNode(UamNode):
         kind = catalogue.chosen(section).kind
         self.parameter_set = NodeParameters(self, kind, defaults=section, derived=derived)
         self._period = vehicle.control_period
-        self._stage = self._new_stage()
-        self.parameter_set.apply = self._stage.set_parameters
+        self.stage = self._new_stage()
+        self.parameter_set.apply = self.stage.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
@@ -74,7 +76,6 @@ class StateEstimatorNode(UamNode):
         rate = NodeParameters(self, OdometryParameters, read_only=True).current.odometry_rate
         self._odometry_period = round(SECOND / rate)  # [ns]
         self._odometry_at = 0  # [ns] stamp of the last odometry
-        self._to_publish: tuple[int, np.ndarray] | None = None  # stamp [ns] and state
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
@@ -82,87 +83,99 @@ class StateEstimatorNode(UamNode):
         self._diverged_before = 0  # times that the estimate had diverged at the last look
         self._refused_before = 0  # number of refused poses at the last report
         self._exposed: deque[int] = deque(maxlen=POSES)  # stamps [ns] since the last report
-        self._updates, self._biases = Backlog(), Backlog()
+        self._updates = Backlog()
 
     def _new_stage(self) -> EstimatorStage:
         return estimator_stage(self.parameter_set.current, len(self._names), self._period)
 
     def _on_mocap(self, data: bytes) -> None:
         stamp, position, quaternion = read_pose(data)
+        self.note_pose(stamp)
+        self.stage.mocap(stamp, position, quaternion)
+
+    def note_pose(self, stamp: int) -> None:
+        """Note the stamp [ns] of a pose that has arrived."""
         self._exposed.append(stamp)
-        self._stage.mocap(stamp, position, quaternion)
 
     def _on_joints(self, data: bytes) -> None:
-        self._stage.joints(*read_joints(data, self._names))
+        self.stage.joints(*read_joints(data, self._names))
 
     def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()
         stamp, gyro, force = read_imu(data)
-        if stamp < self._stage.stamp - NEW_TIME:
-            self._begin_anew(stamp)
+        self.begin_anew_before(stamp)
         self.take_waiting(self._mocap)
         self.take_waiting(self._joints)
         self.times.lap(DECODE)
-        try:
-            state = self._stage.imu(stamp, gyro, force)
-        except ValueError as error:
-            self.warn(f"{error}; ignored", "imu")
-            return
+        state = self.estimated(lambda: self.stage.imu(stamp, gyro, force))
         self.times.lap(STAGE)
         if state is None:
-            self._tell_divergence()
             return
-        stamp = self._stage.stamp
-        # one output per sample: the filters need every sample
-        self._updates.put((stamp, self._writer.fill(stamp, state), begun))
-        if self._stage.bias_due:
-            self._biases.put(self._bias_writer.fill(stamp, *self._stage.estimator.imu_bias))
-        if not 0 <= stamp - self._odometry_at < self._odometry_period:
-            self._odometry_at = stamp - stamp % self._odometry_period
-            if any(one.get_subscription_count() for one in (self._odometry, self._hand)):
-                self._to_publish = stamp, state.copy()
+        # one state per sample: the filters need every sample
+        biases = self.stage.estimator.imu_bias if self.stage.bias_due else None
+        self._updates.put((self.stage.stamp, state.copy(), biases, begun))
         if not self.deferred:
             self.settle()
 
+    def estimated(self, take: Callable[[], T]) -> T | None:
+        """Return take(), which gives the stage an IMU sample; None if it is an older one."""
+        try:
+            found = take()
+        except ValueError as error:
+            self.warn(f"{error}; ignored", "imu")
+            return None
+        self._tell_divergence()
+        return found
+
     def _tell_divergence(self) -> None:
         """Say so if the estimate has diverged in this tick."""
-        if self._stage.diverged > self._diverged_before:
-            self._diverged_before = self._stage.diverged
+        if self.stage.diverged > self._diverged_before:
+            self._diverged_before = self.stage.diverged
             self.get_logger().error(f"{DIVERGED}; it begins anew")
 
-    def _begin_anew(self, stamp: int) -> None:
-        """Forget all samples: the stamps, now `stamp` [ns], are those of a new simulation."""
+    def begin_anew_before(self, stamp: int) -> None:
+        """Forget all samples if the stamp [ns] of the next one is that of a new simulation."""
+        if stamp >= self.stage.stamp - NEW_TIME:
+            return
         self.get_logger().warning(
-            f"stamps went back from {self._stage.stamp / SECOND:.3f} s to "
+            f"stamps went back from {self.stage.stamp / SECOND:.3f} s to "
             f"{stamp / SECOND:.3f} s: the estimate begins anew"
         )
-        self._stage = self._new_stage()
-        self.parameter_set.apply = self._stage.set_parameters
+        self.stage = self._new_stage()
+        self.parameter_set.apply = self.stage.set_parameters
         self._diverged_before = 0
 
     def settle(self) -> None:
-        for stamp, data, begun in self._updates.take():
-            self._state.publish(data)
+        for stamp, state, biases, begun in self._updates.take():
+            self.send(stamp, state, biases)
             self.done_tick(stamp, begun)
-        for data in self._biases.take():
-            self._bias.publish(data)
-        if self._to_publish is not None:  # after the state, for which the controllers wait
-            stamp, state = self._to_publish
+
+    def send(self, stamp: int, state: np.ndarray, biases: np.ndarray | None) -> None:
+        """Publish the state (3, 6 + n) of a tick, and what is due besides.
+
+        biases (2, 3): of gyroscope and accelerometer, None if they are not due.
+        """
+        self._state.publish(self._writer.fill(stamp, state))  # the controllers wait for it
+        if biases is not None:
+            self._bias.publish(self._bias_writer.fill(stamp, *biases))
+        if 0 <= stamp - self._odometry_at < self._odometry_period:
+            return
+        self._odometry_at = stamp - stamp % self._odometry_period
+        if self._odometry.get_subscription_count():
             self._odometry.publish(odometry_message(stamp, state, self._body))
-            if self._chain is not None:
-                self._hand.publish(hand_message(stamp, self._chain, state[CHI]))
-            self._to_publish = None
+        if self._chain is not None and self._hand.get_subscription_count():
+            self._hand.publish(hand_message(stamp, self._chain, state[CHI]))
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        refused = self._stage.estimator.refused_poses
+        refused = self.stage.estimator.refused_poses
         # a new estimate counts from zero
         fresh, self._refused_before = max(0, refused - self._refused_before), refused
         gaps = np.diff(sorted(set(self._exposed)))
         self._exposed.clear()
-        ticks, age = self._stage.ticks, self._stage.pose_age
+        ticks, age = self.stage.ticks, self.stage.pose_age
         values: dict[str, object] = {
             "poses refused": refused,
-            "estimates begun anew": self._stage.diverged,
+            "estimates begun anew": self.stage.diverged,
             "IMU samples repeated": ticks.repeated,
             "IMU samples missing": ticks.missing,
             "pose age at arrival, mean [ms]": ""
@@ -171,7 +184,7 @@ class StateEstimatorNode(UamNode):
             "pose age at arrival, max [ms]": f"{1e-6 * age.largest:.1f}",
         }
         age.restart()
-        if self._stage.held_back:
+        if self.stage.held_back:
             return ERROR, DIVERGED, values
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values

@@ -1,21 +1,24 @@
 """One control tick, from sensor samples to the autopilot's setpoint: all stages in order.
 
-STAGES at the end of this file is the block diagram. The direct engine calls `ControlTick.tick`. In
-a flight over ROS each stage runs in a node of its own, and the signals are topics.
+STAGES at the end of this file is the block diagram. The direct engine and the fused nodes call
+`ControlTick.tick`. With separate nodes each stage runs in a node of its own, and the signals are
+topics.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Self
 
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import ARM, POSITION
+from uam_control.coordinates import ALPHA, ARM, POSITION
 from uam_control.estimation.estimator import write_biases
 from uam_control.maths.compiled import borrowing, counts_references
 from uam_control.maths.memory import put
 from uam_control.mission import Mission, Scenario, StartParameters
+from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.mission.nominal_tick import watch_due
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
@@ -49,26 +52,18 @@ class ControlTick:
 
     def __init__(
         self,
-        scenario: Scenario,
-        sets: Mapping[str, ParameterSet],
+        estimator: EstimatorStage,
+        mission: MissionStage,
+        laws: Sequence[LawStage],
+        hand: HandStage,
         bridge: BridgeStage,
-        timing: Timing,
-        vehicle: VehicleDescription | None = None,
     ) -> None:
-        """sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
-        begin of the reference is compared with, if given."""
+        """laws: of position, attitude and arm; hand: before that of the arm."""
         self.stages = list(STAGES)
-        estimator, joints = sets["state_estimator"], len(scenario.arm_start)
-        self.estimator = estimator_stage.estimator_stage(estimator, joints, timing.control_period)
-        start = StartParameters(auto_start=True)
-        mission = Mission(scenario, sets["mission"], start, vehicle, compared=True)
-        self.mission = MissionStage(mission, timing)
-        self.position = LawStage(PositionController(sets["position_controller"]), timing)
-        self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)
+        self.estimator, self.mission = estimator, mission
+        self.hand, self.bridge = hand, bridge
+        self.position, self.attitude, self.arm = laws
         self.measured_delay = MeasuredDelay(self.attitude.controller)
-        self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
-        self.hand = HandStage(sets["arm_controller"], timing.control_period, joints, vehicle)
-        self.bridge = bridge
         self.laws: dict[str, LawStage] = {
             "position": self.position,
             "attitude": self.attitude,
@@ -80,8 +75,39 @@ class ControlTick:
         self.arrays = self.signals.arrays()
         self.biases = np.zeros((2, 3))
         names = [one.controller.names for one in self.laws.values()]
+        joints = self.estimator.state.shape[1] - ALPHA
         self.mission.inputs.share(joints, names)
         self.told: tuple | None = None  # what the bridge has of the mission
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        sets: Mapping[str, ParameterSet],
+        bridge: BridgeStage,
+        timing: Timing,
+        vehicle: VehicleDescription | None = None,
+    ) -> Self:
+        """Return the tick of a flight that starts by itself.
+
+        sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
+        begin of the reference is compared with, if given.
+        """
+        estimator, joints = sets["state_estimator"], len(scenario.arm_start)
+        start = StartParameters(auto_start=True)
+        mission = Mission(scenario, sets["mission"], start, vehicle, compared=True)
+        controllers = (
+            PositionController(sets["position_controller"]),
+            AttitudeController(sets["attitude_controller"]),
+            ArmController(sets["arm_controller"]),
+        )
+        return cls(
+            estimator_stage.estimator_stage(estimator, joints, timing.control_period),
+            MissionStage(mission, timing),
+            [LawStage(controller, timing) for controller in controllers],
+            HandStage(sets["arm_controller"], timing.control_period, joints, vehicle),
+            bridge,
+        )
 
     def tick(
         self,
@@ -163,6 +189,7 @@ def fly_mission(tick: ControlTick) -> bool:
         tick.told = told
         tick.bridge.arm(output.arm)
         tick.bridge.mission(s.stamp, *told[1:])
+    tick.bridge.hands = output.phase == HAND_CHECK
     return True
 
 
@@ -205,7 +232,7 @@ def control_arm(tick: ControlTick) -> bool:
 def send_setpoint(tick: ControlTick) -> bool:
     """state, laws → setpoint to the autopilot; the autopilot's report to the mission."""
     s, bridge = tick.signals, tick.bridge
-    bridge.hear(s.stamp)
+    bridge.hear(s.stamp, s.late)
     bridge.note_state(s.stamp, s.state)
     tau_q = s.tau_q if s.flying else None
     reference = s.reference[:, POSITION]

@@ -35,7 +35,7 @@ class MissionStage:
     Between `begin` and `advance`, `output` is the mission's output at this tick, see
     `MissionOutput`, `flying` is whether the controllers fly its reference, `reference`
     (3, 6 + n) what they fly, see `ahead`, and `time` the mission time [s]. `ahead` [ns]: the stamp
-    of the newest reference.
+    of the newest reference; `anew`: whether the reference of this tick was computed in it.
 
     While the mission only follows its scenario, compiled functions do the same: `begin_tick` and
     `advance` of this module, on `arrays`.
@@ -50,7 +50,7 @@ class MissionStage:
         self.memory = record("ahead last period flown", "time")
         self.period = timing.period
         self.inputs = SupervisorInputs(self.period / SECOND)
-        self.flying = False
+        self.flying = self.anew = False
         self.reference, self.time = self.output.reference, self.output.time
         self.ahead = self._last = -1
         self._armed_since: float | None = None
@@ -78,24 +78,24 @@ class MissionStage:
         delays = tuple(math.nan if one is None else one for one in (round_trip, loop_delay))
         self._reports.append((stamp, connected, armed_since, delays, authority))
 
-    def begin(self, stamp: int, state: np.ndarray) -> bool:
+    def begin(self, stamp: int, state: np.ndarray) -> None:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
 
-        Returns whether the reference of this tick was computed now: at the first tick, and where
-        the newest one does not serve it.
+        The reference of this tick is computed `anew` at the first tick, and where the newest one
+        does not serve it.
         """
         if stamp < self.ahead - NEW_TIME:
             self._begin_anew()
         self.take_reports(stamp)
         self._readings = self.inputs.tick(stamp)
         last, self._last = self._last, stamp
-        anew = stamp != self.ahead and not serves(self.ahead, last, stamp, self.period)
-        if anew:
+        serving = stamp == self.ahead or serves(self.ahead, last, stamp, self.period)
+        self.anew = not serving
+        if self.anew:
             self.advance(stamp - self.period, state)
         output, step = self.output, stamp - self.ahead
         self.reference = carried(output.reference, step) if step else output.reference
         self.time = output.time + step / SECOND if output.time >= 0.0 else output.time
-        return anew
 
     def take_reports(self, stamp: int) -> None:
         """Use the bridge's reports of the ticks before `stamp` [ns]."""

@@ -62,6 +62,7 @@ class Signals:
     joints: Joints | None = None
     imu: Imu | None = None
     payload: Pose | None = None
+    late: float = 0.0  # [s] for which the tick has waited while a process stood still
     # mission
     flying: bool = False  # whether position and attitude are controlled
     magnet: bool = False

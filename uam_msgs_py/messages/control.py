@@ -20,7 +20,6 @@ from uam_control.coordinates import (
     coordinates,
 )
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.read_once import read_once
 from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.trajectories import (
     CommandWriter,
@@ -48,7 +47,6 @@ def arm_alone(joints: int) -> TrajectoryReader:
     return TrajectoryReader(arm_coordinates(joints))
 
 
-@read_once
 def read_state(data: bytes, joints: int | None = None) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage.
 
@@ -82,7 +80,6 @@ class ReferenceWriter:
         return self._arm.fill(stamp, reference[:, ARM], mission_time)
 
 
-@read_once
 def read_reference(data: bytes, joints: int | None = None) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage. joints: see `read_state`."""
     message = Serialized(JointTrajectory, data)
@@ -132,7 +129,6 @@ class PositionCommandWriter(CommandWriter):
         return self.stamped(stamp)
 
 
-@read_once
 def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     """Return (stamp [ns], command); raises BadMessage."""
     message = Serialized(JointTrajectory, data)

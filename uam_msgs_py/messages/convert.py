@@ -18,7 +18,6 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray
 
 from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage
-from uam_msgs_py.messages.read_once import read_once
 from uam_msgs_py.messages.serialized import (
     Serialized,
     Template,
@@ -79,6 +78,20 @@ def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
     return message.stamp, names, values
 
 
+def read_efforts(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray]:
+    """Return (stamp [ns], effort (n,) [N m]) in the order of `names`, NaN where there is none.
+
+    Raises BadMessage if one of `names` is missing.
+    """
+    stamp, order, effort = read_values(data, "effort")
+    if order != names:
+        try:
+            effort = effort[[order.index(name) for name in names]]
+        except ValueError:
+            check_names(order, names)
+    return stamp, effort
+
+
 class ImuWriter(Template):
     """Writes an Imu without orientation (orientation_covariance[0] = -1)."""
 
@@ -116,7 +129,6 @@ class PoseWriter(Template):
         return self.stamped(stamp)
 
 
-@read_once
 def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], position (3,) [m], unit quaternion (4,) body → world [w x y z]).
 

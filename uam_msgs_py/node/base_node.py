@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 import rclpy
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -31,12 +30,11 @@ from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
-from uam_msgs_py.node.local_delivery import LocalDelivery, Outlet
 from uam_msgs_py.node.namespace import adopt_sections, expanded, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
 from uam_msgs_py.node.stamp_watch import StampWatch
-from uam_msgs_py.node.tick_times import DECODE, PUBLISH, tick_times
+from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
@@ -56,17 +54,16 @@ class UamNode(TunableNode):
 
     wake_up = 0.1  # s of wall time, longest wait for a trigger
 
-    def __init__(self, name: str, delivery: LocalDelivery | None = None):
-        """delivery: between the nodes of this process; None if there are no others."""
+    def __init__(self, name: str):
         super().__init__(name)
-        self._delivery = delivery
         self.process = NodeParameters(self, ProcessParameters, read_only=True).current
         self.times = tick_times(NodeParameters(self, TickTimesParameters, read_only=True).current)
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
-        self._outlets: dict[str, Publisher | Outlet] = {}
-        self._inlets: dict[str, Subscription] = {}
+        self.outlets: dict[str, Publisher] = {}
+        self.inlets: dict[str, Subscription] = {}
+        self._handles: dict[str, Callable[[Any], None]] = {}  # of the inlets
         self.rightful = rightful_nodes(self)
         self._stamps = StampWatch()
         self.joins: list[StampJoin] = []
@@ -83,18 +80,10 @@ class UamNode(TunableNode):
         self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
 
-    def publisher(self, topic: Topic) -> Publisher | Outlet:
+    def publisher(self, topic: Topic) -> Publisher:
         """Return a publisher of `topic`."""
-        kind, name, qos = topic.type, topic.name, topic.qos
-        if self._delivery is None:
-            made = self.create_publisher(kind, name, qos)
-        else:
-            silent = PublisherEventCallbacks(use_default_callbacks=False)
-            publisher = self.create_publisher(kind, name, qos, event_callbacks=silent)
-            made = self._delivery.outlet(self, topic, publisher)
-        self._outlets[name] = made
-        # within a process `publish` gives the message to the readers, which decode it
-        self.times.watch(made, topic, PUBLISH if self._delivery is None else DECODE)
+        made = self.outlets[topic.name] = self.create_publisher(topic.type, topic.name, topic.qos)
+        self.times.watch(made, topic)
         return made
 
     def listen(
@@ -112,7 +101,7 @@ class UamNode(TunableNode):
         `Topic.reading`.
         """
         counts, arrivals, name = self._counts, self._arrivals, topic.name
-        counts[name] = 0
+        counts[name], self._handles[name] = 0, handle
         if required:
             self._required[name] = 0
 
@@ -121,7 +110,7 @@ class UamNode(TunableNode):
         def checked(message: Any) -> None:
             if stamped:
                 self._check_stamp(name, stamp_of(message))
-            handle(message)
+            self._handles[name](message)
 
         def callback(message: Any) -> None:
             if self.door.accepts(made, checked, message):
@@ -129,31 +118,24 @@ class UamNode(TunableNode):
                 arrivals[name] = time.monotonic()
 
         raw = raw or stays_serialized(topic.type)
-        made = self._inlets[name] = self._subscription(topic, callback, qos or topic.reading, raw)
-        self.door.guard(made, name, self.rightful, lambda: self.ticks > 0)
-        self._stamps.listen(name)
-        if self._delivery is not None:
-            self._delivery.note(self, name, made)
-        return made
-
-    def _subscription(
-        self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile, raw: bool
-    ) -> Subscription:
-        kind, name = topic.type, topic.name
-        if self._delivery is None:
-            return self.create_subscription(kind, name, callback, qos, raw=raw)
-        return self.create_subscription(
-            kind,
+        made = self.inlets[name] = self.create_subscription(
+            topic.type,
             name,
             callback,
-            self._delivery.reading(self, topic, qos),
+            qos or topic.reading,
             raw=raw,
             callback_group=polling.Polled(),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        self.door.guard(made, name, self.rightful, lambda: self.ticks > 0)
+        self._stamps.listen(name)
+        return made
+
+    def handle_by(self, topic: Topic, handle: Callable[[Any], None]) -> None:
+        """Call `handle(message)` from now on for each message of `topic`, to which it listens."""
+        self._handles[topic.name] = handle
 
     def _check_stamp(self, name: str, stamp: int) -> None:
-        clock = self._inlets.get(self._stamps.clock)
+        clock = self.inlets.get(self._stamps.clock)
         guard = None if clock is None else self.door.guards.get(clock)
         self._stamps.check(name, stamp, "" if guard is None else guard.publisher)
 
@@ -164,9 +146,6 @@ class UamNode(TunableNode):
         topics in another order. A node that acts on the last message of a tick calls this first for
         its other inputs.
         """
-        if self._delivery is not None:
-            self._delivery.take_waiting(subscription)
-            return
         for message in self.door.messages(subscription):
             subscription.callback(message)
 
@@ -189,6 +168,11 @@ class UamNode(TunableNode):
         """Log a warning, at most once per LOG_PERIOD for each `key` (default: the text)."""
         if self.door.due(key or text):
             self.get_logger().warning(text)
+
+    @property
+    def dropped(self) -> int:
+        """Number of ticks without an answer."""
+        return sum(join.dropped for join in self.joins)
 
     def done_tick(self, stamp: int, begun: float) -> None:
         """Count the tick `stamp` [ns] as done; begun: time.perf_counter() [s] at its start."""
@@ -233,7 +217,7 @@ class UamNode(TunableNode):
         ticks, last = self._at_last_report
         now = time.monotonic()
         done = self.ticks - ticks
-        dropped = sum(join.dropped for join in self.joins)
+        dropped = self.dropped
         self._at_last_report = (self.ticks, now)
         if new := self.door.news():
             level, summary = ERROR, "; ".join(new)
@@ -253,8 +237,7 @@ class UamNode(TunableNode):
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)
-        uncounted = self._delivery.writers if self._delivery else None
-        common |= connections.of(self, self._outlets, self._inlets, uncounted)
+        common |= connections.of(self, self.outlets, self.inlets)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(diagnostic(stamp, label(self), level, summary, common | values))
 
@@ -294,7 +277,7 @@ def run(make: Callable[[], UamNode], name: str) -> int:
     def spin_it(
         nodes: Sequence[UamNode], running: Callable[[], bool], at_rest: Callable[[], None]
     ) -> None:
-        spin(nodes[0], running, nodes[0].wake_up, at_rest)
+        spin(nodes, running, nodes[0].wake_up, at_rest)
 
     return run_together(lambda: [make()], name, spin_it)
 

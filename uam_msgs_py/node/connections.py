@@ -8,11 +8,11 @@ flight must wait for all connections before its first tick.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from typing import Protocol
+from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.messages import topics
@@ -23,28 +23,15 @@ NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has a node's na
 READERS, WRITERS = "readers of ", "writers of "
 
 
-class Counted(Protocol):
-    """rclpy's publisher, or one that delivers within its process."""
-
-    def get_subscription_count(self) -> int:
-        """Return the number of connected subscriptions."""
-        ...
-
-
 def of(
     node: Node,
-    outlets: Mapping[str, Counted],
+    outlets: Mapping[str, Publisher],
     inlets: Mapping[str, Subscription],
-    uncounted: Callable[[Subscription], int] | None = None,
 ) -> dict[str, int]:
-    """Return the diagnostic values: for each topic of `node`, its number of connected ends.
-
-    uncounted: connected publishers of a subscription that the middleware does not count.
-    """
-    further = uncounted or (lambda inlet: 0)
+    """Return the diagnostic values: for each topic of `node`, its number of connected ends."""
     counts = {
         READERS: {name: outlet.get_subscription_count() for name, outlet in outlets.items()},
-        WRITERS: {name: _writers(node, inlet, further(inlet)) for name, inlet in inlets.items()},
+        WRITERS: {name: _writers(node, inlet) for name, inlet in inlets.items()},
     }
     return {
         kind + expanded(node.get_namespace(), name): count
@@ -53,14 +40,14 @@ def of(
     }
 
 
-def _writers(node: Node, inlet: Subscription, further: int) -> int:
+def _writers(node: Node, inlet: Subscription) -> int:
     """Return the number of connected publishers whose node name is known in the node's graph.
 
     The name may arrive after the connection; until then `SolePublisher` refuses the messages.
     """
     ends = node.get_publishers_info_by_topic(inlet.topic_name)
     named = sum(end.node_name != NAMELESS for end in ends)
-    return min(inlet.get_publisher_count() + further, named)
+    return min(inlet.get_publisher_count(), named)
 
 
 class Connections:

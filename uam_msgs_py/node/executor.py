@@ -9,9 +9,11 @@ benchmarks/executor.py measures a tick. rclpy's EventsExecutor (experimental) co
 has no point at which all received messages are delivered; `settle` needs one.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.other_entities import OtherEntities
@@ -20,9 +22,9 @@ from uam_msgs_py.node.waiting import WaitSet, wait_for
 
 
 class LeanExecutor:
-    """Spins one node; create its subscriptions, services and timers before.
+    """Spins the nodes of a process; create their subscriptions, services and timers before.
 
-    After a wake-up messages are delivered in the order of the node's subscriptions, triggers last.
+    After a wake-up messages are delivered in the order of the nodes' subscriptions, triggers last.
     A message whose callback raises is refused, see `Door`; an exception of `settle` ends `spin`.
 
     If the node has `defer` and `settle`, `settle` is called after all received messages of a
@@ -32,91 +34,115 @@ class LeanExecutor:
     completes a tick (`triggers`): only this input wakes the node, and the others are read along. If
     a trigger arrived before another input of its tick (`stalled()`), any input wakes the node.
 
-    If the node has `process.busy_poll`, the loop looks for the input without sleeping for so long
-    after each tick: the thread then needs no wake-up by the system. Its `times` measure the edges
-    of the tick.
+    If the first node has `process.busy_poll`, the loop looks for the input without sleeping for so
+    long after each tick: the thread then needs no wake-up by the system. Its `times` measure the
+    edges of the tick, those of other nodes begin with it.
     """
 
     def __init__(
         self,
-        node: Node,
+        nodes: Node | Sequence[Node],
         triggers: Iterable[str] | None = None,
         stalled: Callable[[], bool] | None = None,
         at_rest: Callable[[], None] = lambda: None,
+        often: Callable[[Subscription], bool] = lambda subscription: True,
     ):
-        """triggers: names of topics; stalled: see class; None: those of the node.
+        """triggers: names of topics; stalled: see class; None: those of the nodes.
 
-        at_rest: called between two ticks, fifty times a second.
+        at_rest: called between two ticks, fifty times a second. often: whether the messages of a
+        subscription are taken at each wake-up; those of others are taken between two ticks.
         """
-        self._node = node
-        self._trigger_names = set(getattr(node, "triggers", ()) if triggers is None else triggers)
-        self._stalled = stalled or getattr(node, "stalled", lambda: False)
-        self._door = getattr(node, "door", None) or Door(node, tells=True)
-        self._rest = OtherEntities([node])
-        self._settle = getattr(node, "settle", lambda: None)
-        if hasattr(node, "defer"):
-            node.defer()
-        self._at_rest = at_rest
-        self._times = getattr(node, "times", NoTickTimes())
-        process = getattr(node, "process", None)
+        self._nodes = nodes if isinstance(nodes, Sequence) else [nodes]
+        first, stalling = self._nodes[0], _those_of(self._nodes, "stalled")
+        own = {name for node in self._nodes for name in getattr(node, "triggers", ())}
+        self._trigger_names = own if triggers is None else set(triggers)
+        self._stalled = stalled or (lambda: any(node_stalled() for node_stalled in stalling))
+        self._doors = [
+            getattr(node, "door", None) or Door(node, tells=True) for node in self._nodes
+        ]
+        self._rest = OtherEntities(self._nodes)
+        self._settle = _those_of(self._nodes, "settle")
+        for defer in _those_of(self._nodes, "defer"):
+            defer()
+        self._at_rest, self._often = at_rest, often
+        self._times = getattr(first, "times", NoTickTimes())
+        every = (getattr(node, "times", self._times) for node in self._nodes)
+        self._measuring = [times for times in every if type(times) is not NoTickTimes]
+        process = getattr(first, "process", None)
         self._busy_poll = 0.0 if process is None else process.busy_poll
         self._gather()
 
     def _gather(self) -> None:
-        """Collect the node's subscriptions and create their wait set."""
-        node = self._node
-        names = {node.resolve_topic_name(name) for name in self._trigger_names}
-        by_trigger = sorted(node.subscriptions, key=lambda s: s.topic_name in names)
-        self._subscriptions = by_trigger
-        self._triggers = [s.handle for s in by_trigger if s.topic_name in names]
-        self._inputs = [s.handle for s in by_trigger]
-        self._messages = WaitSet(len(self._subscriptions), 0, 0, 0, 0, 0, node.context.handle)
+        """Collect the nodes' subscriptions and create the wait set."""
+        first = self._nodes[0]
+        names = {first.resolve_topic_name(name) for name in self._trigger_names}
+        every = [
+            (s, d) for n, d in zip(self._nodes, self._doors, strict=True) for s in n.subscriptions
+        ]
+        by_trigger = sorted(every, key=lambda one: one[0].topic_name in names)
+        self._taken = [one for one in by_trigger if self._often(one[0])]
+        self._rare = [one for one in by_trigger if not self._often(one[0])]
+        self._triggers = [s.handle for s, _ in self._taken if s.topic_name in names]
+        self._inputs = [s.handle for s, _ in self._taken]
+        self._messages = WaitSet(len(self._inputs), 0, 0, 0, 0, 0, first.context.handle)
 
     def spin_once(self, timeout: float) -> None:
         """Serve all ready entities; wait for a message at most `timeout` [s].
 
         The wait is shorter if a check of services and timers is due.
         """
-        stamp = getattr(self._node, "stamp", 0)
+        stamp = max(getattr(node, "stamp", 0) for node in self._nodes)
         left = self._rest.left(stamp)
         if not left:
+            self._deliver(self._rare)
             left, changed = self._rest.serve(stamp)
             self._at_rest()
             if changed:
                 self._gather()
-        times = self._times
-        times.rest()
+        for times in self._measuring:
+            times.rest()
         # a driver has no inputs: it waits for its device in `settle`
         inputs = self._inputs if not self._triggers or self._stalled() else self._triggers
         wait_for(self._messages, inputs, min(timeout, left), self._busy_poll)
-        times.woken()
-        door = self._door
-        for subscription in self._subscriptions:
+        for times in self._measuring:
+            times.woken()
+        self._deliver(self._taken)
+        for settle in self._settle:
+            settle()
+
+    def _deliver(self, taken: Iterable[tuple[Subscription, Door]]) -> None:
+        times = self._times
+        for subscription, door in taken:
             for message in door.messages(subscription):
                 times.lap(TAKE)
                 door.accepts(subscription, subscription.callback, message)
                 times.lap(DECODE)
         times.lap(TAKE)
-        self._settle()
 
     def shutdown(self) -> None:
         """Shut down the inner executor."""
         self._rest.shutdown()
 
 
+def _those_of(nodes: Iterable[Node], name: str) -> list[Callable[[], Any]]:
+    """Return the methods `name` of the nodes that have it."""
+    return [getattr(node, name) for node in nodes if hasattr(node, name)]
+
+
 def spin(
-    node: Node,
+    nodes: Sequence[Node],
     running: Callable[[], bool],
     wake_up: float = 0.1,
     at_rest: Callable[[], None] = lambda: None,
+    often: Callable[[Subscription], bool] = lambda subscription: True,
 ) -> None:
-    """Spin `node` until `running()` is false, checked after messages and each `wake_up` [s].
+    """Spin `nodes` until `running()` is false, checked after messages and each `wake_up` [s].
 
-    at_rest: see LeanExecutor.
+    at_rest, often: see LeanExecutor.
     """
-    executor = LeanExecutor(node, at_rest=at_rest)
+    executor = LeanExecutor(nodes, at_rest=at_rest, often=often)
     try:
-        while running() and node.context.ok():
+        while running() and nodes[0].context.ok():
             executor.spin_once(wake_up)
     finally:
         executor.shutdown()

@@ -143,27 +143,6 @@ class SolePublisher:
         return names
 
 
-class LocalPublisher(SolePublisher):
-    """Guard of a subscription whose rightful publisher is in the same process.
-
-    Its messages do not come over the middleware, see `local_delivery`. What does is refused.
-    """
-
-    def __init__(self, node: Node, subscription: Subscription, publisher: Node, gid: bytes) -> None:
-        """publisher: the node; gid: of its publisher of the topic."""
-        name = full_name(publisher.get_namespace(), publisher.get_name())
-        super().__init__(node, subscription, Rightful(name, only=True), lambda: True)
-        self.rightful, self._gid = name, gid
-
-    def take(self) -> None:
-        """Discard what has come over the middleware; count and name the foreign publishers."""
-        while super().take() is not None:
-            """Of the publisher in this process: its message is already here."""
-
-    def _may(self, gid: bytes, names: dict[bytes, str]) -> bool:
-        return False
-
-
 def publishers(node: Node, topic: str) -> dict[bytes, str]:
     """Return the publishers of a topic (absolute name) in the graph: gid → full node name."""
     return {

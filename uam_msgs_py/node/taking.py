@@ -2,7 +2,7 @@
 
 rclpy's `take_message` reports stamps and sequence number of a message, but not `publisher_gid`.
 This module calls the same function of librcl. The structures are those of rmw/types.h and
-rcutils/types/uint8_array.h of ROS 2 Jazzy. `identity` is that of a publisher of this process.
+rcutils/types/uint8_array.h of ROS 2 Jazzy.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import ctypes
 from ctypes import (
     POINTER,
     c_bool,
-    c_char_p,
     c_int,
     c_int64,
     c_size_t,
@@ -20,7 +19,6 @@ from ctypes import (
     c_void_p,
 )
 
-from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.node.librcl import OK, rcl, rcutils
@@ -55,29 +53,11 @@ class _Info(ctypes.Structure):
     ]
 
 
-class _Gid(ctypes.Structure):
-    _fields_ = [("implementation", c_char_p), ("data", c_uint8 * GID_SIZE)]
-
-
 _take = rcl.rcl_take_serialized_message
 _take.argtypes = [c_void_p, POINTER(_Bytes), POINTER(_Info), c_void_p]
 _take.restype = c_int
 rcutils.rcutils_get_default_allocator.restype = _Allocator
 rcutils.rcutils_uint8_array_fini.argtypes = [POINTER(_Bytes)]
-rcl.rcl_publisher_get_rmw_handle.argtypes = [c_void_p]
-rcl.rcl_publisher_get_rmw_handle.restype = c_void_p
-_get_gid = rcl.rmw_get_gid_for_publisher  # of the middleware, which librcl has loaded
-_get_gid.argtypes = [c_void_p, POINTER(_Gid)]
-_get_gid.restype = c_int
-
-
-def identity(publisher: Publisher) -> bytes:
-    """Return what `Taker.gid` is for the messages of a publisher; b"" if it is not known."""
-    found = _Gid()
-    handle = rcl.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
-    if _get_gid(handle, ctypes.byref(found)) != OK:
-        return b""
-    return bytes(found.data)
 
 
 class Taker:

@@ -58,7 +58,7 @@ class NoTickTimes:
     def tick(self, stamp: int) -> None:
         """Do nothing."""
 
-    def watch(self, publisher: Publisher, topic: topics.Topic, part: int = PUBLISH) -> None:
+    def watch(self, publisher: Publisher, topic: topics.Topic) -> None:
         """Do nothing."""
 
     def measured(self, send: Callable[[], None]) -> Callable[[], None]:
@@ -115,11 +115,8 @@ class TickTimes(NoTickTimes):
         self._begin(_LAST[0])  # of a tick that may follow in the same wake-up
         self._before = 0
 
-    def watch(self, publisher: Publisher, topic: topics.Topic, part: int = PUBLISH) -> None:
-        """Measure the publications of `topic`: from now on `publisher.publish` takes laps.
-
-        part: to which it belongs.
-        """
+    def watch(self, publisher: Publisher, topic: topics.Topic) -> None:
+        """Measure the publications of `topic`: from now on `publisher.publish` takes laps."""
         rank = RESULTS.index(topic) if topic in RESULTS else -1
         publish = publisher.publish
 
@@ -127,11 +124,11 @@ class TickTimes(NoTickTimes):
             self.lap(ENCODE)
             sending = _LAST[0]
             publish(message)
-            self.lap(part)
+            self.lap(PUBLISH)
             if rank > self._rank:
                 self._rank, self._sending, self._sent = rank, sending, _LAST[0]
                 self._until[:] = self._spent
-                self._until[part] -= _LAST[0] - sending
+                self._until[PUBLISH] -= _LAST[0] - sending
 
         publisher.publish = measured
 

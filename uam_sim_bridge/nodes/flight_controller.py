@@ -3,9 +3,9 @@
     ros2 run uam_control flight_controller --ros-args --params-file parameters.yaml
 
 The nodes are those of the separate layout, with the same names, parameters, services and topics.
-They pass messages to each other without the middleware (`local_delivery`), in the order of
-`control_tick.STAGES`, and send them when the setpoint has left. The node `flight_controller` has
-the parameters of the process.
+Their stages run as one list, see `fused_tick`. Without one of the nodes, or with another publisher
+of a topic between them, they pass each other messages as separate nodes do. The node
+`flight_controller` has the parameters of the process.
 
 The process is the unit: when it ends, all of its nodes have ended, the bridge's heartbeats too.
 """
@@ -21,17 +21,15 @@ from uam_control.nodes.mission import MissionNode
 from uam_control.nodes.position_controller import PositionControllerNode
 from uam_control.nodes.state_estimator import StateEstimatorNode
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, Text, number
-from uam_control.stages.control_tick import STAGES
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import UamNode, run_together
-from uam_msgs_py.node.local_delivery import LocalDelivery
+from uam_msgs_py.node.executor import spin as spin_nodes
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
-from uam_msgs_py.node.own_endpoints import ignore_own_endpoints
-from uam_msgs_py.node.tick_executor import TickExecutor
+from uam_sim_bridge.nodes.fused_tick import FusedTick, is_whole
 from uam_sim_bridge.nodes.mavlink_bridge import MavlinkBridgeNode
 
 NAME = wiring.FLIGHT_CONTROLLER
-KINDS: Mapping[str, Callable[[LocalDelivery], UamNode]] = dict(
+KINDS: Mapping[str, Callable[[], UamNode]] = dict(
     zip(
         wiring.FUSED,
         (
@@ -42,19 +40,6 @@ KINDS: Mapping[str, Callable[[LocalDelivery], UamNode]] = dict(
         strict=True,
     )
 )
-# What of a node runs as a stage of `control_tick.STAGES`. The listeners of the sensors have run
-# when the first node acts; the hand's stage runs with the arm law.
-ACTS: Mapping[str, tuple[str, str] | None] = {
-    "listeners of the sensors": None,
-    "estimator": (wiring.ESTIMATOR, "settle"),
-    "mission": (wiring.MISSION, "begin_ticks"),
-    "position law": (wiring.POSITION, "settle"),
-    "attitude law": (wiring.ATTITUDE, "settle"),
-    "hand": None,
-    "arm law": (wiring.ARM, "settle"),
-    "bridge": (wiring.BRIDGE, "settle"),
-    "next reference": (wiring.MISSION, "look_ahead"),
-}
 
 
 @dataclass(frozen=True)
@@ -72,11 +57,10 @@ class FlightControllerParameters(ParameterSet):
 
 
 class FlightControllerNode(UamNode):
-    """Parameters and diagnostics of the process; a tick is one pass of all nodes."""
+    """Parameters and diagnostics of the process; a tick is a whole pass through the stages."""
 
-    def __init__(self, delivery: LocalDelivery) -> None:
-        super().__init__(NAME, delivery)
-        self.delivery = delivery
+    def __init__(self) -> None:
+        super().__init__(NAME)
         absent = Text("nodes that are not in this process", f"of {', '.join(KINDS)}; empty: none")
         given = declared_text(self, "without", "", absent)
         self.without = tuple(filter(None, (name.strip() for name in given.split(","))))
@@ -84,14 +68,33 @@ class FlightControllerNode(UamNode):
         if unknown:
             raise ParameterError(f"without: '{unknown[0]}'; allowed: {absent.allowed}")
         self.parameter_set = NodeParameters(self, FlightControllerParameters)
-        self.parameter_set.apply = lambda parameters: delivery.thin(parameters.inner_rate)
-        self._last = self  # the node that acts last in a tick
+        self.parameter_set.apply = self._thin
+        self.fused: FusedTick | None = None
+        self._last: UamNode = self  # the node that acts last in a tick
 
-    def connect(self, nodes: Sequence[UamNode]) -> None:
-        """Connect the nodes of the process, in the order of the tick. Raises ParameterError."""
-        self._last = nodes[-1] if nodes else self
-        self.delivery.connect(nodes)
-        self.delivery.thin(self.parameter_set.current.inner_rate)
+    def join(self, nodes: Mapping[str, UamNode]) -> None:
+        """Join the nodes of the process to one tick, if they are a whole one."""
+        self._last = [self, *nodes.values()][-1]
+        if is_whole(nodes):
+            self.fused = FusedTick(self, nodes)
+        self._thin(self.parameter_set.current)
+
+    def _thin(self, parameters: FlightControllerParameters) -> None:
+        if self.fused is not None:
+            self.fused.thin(parameters.inner_rate)
+        elif parameters.inner_rate:
+            self.get_logger().warning("inner_rate: every message is sent, this is no whole tick")
+
+    def settle(self) -> None:
+        """Run the ticks whose samples have arrived; see `FusedTick`."""
+        if self.fused is not None:
+            self.fused.settle()
+        else:
+            self.stamp, self.ticks = self._last.stamp, self._last.ticks
+
+    @property
+    def dropped(self) -> int:
+        return self.fused.dropped if self.fused is not None else 0
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         level, summary, values = super().diagnose()
@@ -99,59 +102,32 @@ class FlightControllerNode(UamNode):
         values |= {
             "nodes": ", ".join(inside),
             "inner rate [Hz]": self.parameter_set.current.inner_rate or "every message",
-            "own messages copied by the middleware": self.delivery.matched,
+            "one tick": self.fused is not None,
         }
         return level, summary, values
-
-    def passed(self, begun: float) -> None:
-        """Count a tick after the pass in which its last node acted; begun: see `done_tick`."""
-        if self._last.stamp != self.stamp:
-            self.done_tick(self._last.stamp, begun)
 
 
 def make() -> list[UamNode]:
     """Return the nodes of the process, that of the process first. Raises ParameterError."""
-    delivery = LocalDelivery()
-    with ignore_own_endpoints():
-        process = FlightControllerNode(delivery)
+    process = FlightControllerNode()
     nodes: dict[str, UamNode] = {}
     for name, kind in KINDS.items():
         if name not in process.without:
             try:
-                nodes[name] = kind(delivery)
+                nodes[name] = kind()
             except ValueError as error:  # ParameterError, ProfileError, ScenarioError ...
                 raise ParameterError(f"{name}: {error}") from None
-    process.connect(list(nodes.values()))
+    process.join(nodes)
     return [process, *nodes.values()]
-
-
-def steps(nodes: Sequence[UamNode]) -> list[Callable[[], None]]:
-    """Return what one pass does: the stages of the tick, and what is sent between them.
-
-    nodes: of `make`. After the bridge's stage the messages that other processes wait for are sent,
-    all others at the end.
-    """
-    process, *acting = nodes
-    by_name = {node.get_name(): node for node in acting}
-    found: list[Callable[[], None]] = []
-    for stage in STAGES:
-        act = ACTS[stage.name]
-        if act is None:
-            continue
-        name, method = act
-        if name in by_name:
-            found.append(getattr(by_name[name], method))
-        if name == wiring.BRIDGE:
-            found.append(process.times.measured(process.delivery.send_answers))
-    return [*found, process.delivery.send]
 
 
 def spin(
     nodes: Sequence[UamNode], running: Callable[[], bool], at_rest: Callable[[], None]
 ) -> None:
-    """Spin the nodes of `make` until `running()` is false; at_rest: see `TickExecutor`."""
-    process = nodes[0]
-    TickExecutor(nodes, process.delivery, steps(nodes), process.passed, at_rest).spin(running)
+    """Spin the nodes of `make` until `running()` is false; at_rest: see `LeanExecutor`."""
+    fused, wake_up = nodes[0].fused, min(node.wake_up for node in nodes)
+    often = {} if fused is None else {"often": fused.often}
+    spin_nodes(nodes, running, wake_up, at_rest, **often)
 
 
 def main() -> int:

@@ -51,7 +51,6 @@ from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.status import ERROR, OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
-from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
@@ -91,8 +90,8 @@ TorqueOrBad = tuple[np.ndarray | None] | Unusable
 class MavlinkBridgeNode(UamNode):
     """Publishes /uam/setpoint, /uam/thrust, /uam/autopilot/state and /uam/autopilot/battery."""
 
-    def __init__(self, delivery: LocalDelivery | None = None) -> None:
-        super().__init__(NAME, delivery)
+    def __init__(self) -> None:
+        super().__init__(NAME)
         vehicle = self._vehicle = described_vehicle(self)
         derived = derived_parameters(vehicle)[NAME]
         mapping = NodeParameters(self, RateThrustParameters, derived=derived)
@@ -194,8 +193,12 @@ class MavlinkBridgeNode(UamNode):
         failsafe = status.state == State.FAILSAFE.value
         self.stage.mission(stamp, status.magnet, failsafe, status.regains)
         self.stage.hands = status.phase == HAND_CHECK
+        self.note_mission(stamp, status.time, status.phase)
+
+    def note_mission(self, stamp: int, time: float, phase: str) -> None:
+        """Note mission time [s] and phase at `stamp` [ns], by which faults of the link begin."""
         if self._faulty is not None:
-            self._faulty.mission_at(stamp / SECOND, status.time, status.phase)
+            self._faulty.mission_at(stamp / SECOND, time, phase)
 
     def _on_kill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Stop the motors at the second call within kill_confirmation."""
@@ -221,13 +224,11 @@ class MavlinkBridgeNode(UamNode):
     ) -> None:
         begun = time.perf_counter()
         self._commanded = stamp
-        self._last_tick = time.monotonic()
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
         self.times.lap(DECODE)
-        self._begin_tick(stamp, self._late_by(stamp))
-        self._adopt()
+        self.stage.hear(stamp, self.begin_tick(stamp))
         if state is BAD or position is BAD or torque is BAD:
             setpoint = self.stage.without(stamp)
         else:
@@ -241,32 +242,45 @@ class MavlinkBridgeNode(UamNode):
                 position.reference,
             )
         self.times.lap(STAGE)
-        self._end_tick(stamp)
-        if self.stage.lift_due:
-            self._factor_writer.position[0] = self.stage.factor
-            self._factor_writer.effort[0] = self.stage.lift
-            self._thrust.publish(self._factor_writer.stamped(stamp))
-        self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
+        self.send(stamp)  # before the plant goes on
+        self.answer(stamp, setpoint)
         self.done_tick(stamp, begun)
 
-    def _late_by(self, stamp: int) -> float:
-        """Return for how long [s] the tick `stamp` [ns] has waited; 0 in lockstep."""
-        if self._options.clock != "realtime":
-            return 0.0
-        return self._waited.late(stamp / SECOND, time.monotonic())
+    def begin_tick(self, stamp: int) -> float:
+        """Begin the tick `stamp` [ns] with what is not of its stage: link and magnet.
 
-    def _begin_tick(self, stamp: int, late: float = 0.0) -> None:
-        """Begin a tick: update delay and faults of the link, receive the autopilot's messages."""
+        Returns for how long [s] it has waited, by the wall clock; 0 in lockstep.
+        """
+        self._last_tick = time.monotonic()
+        late = 0.0
+        if self._options.clock == "realtime":
+            late = self._waited.late(stamp / SECOND, self._last_tick)
+        self._begin_link(stamp)
+        return late
+
+    def _begin_link(self, stamp: int) -> None:
         if self._late:
             self._late.update(stamp / SECOND)
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
-        self.stage.hear(stamp, late)
+        self._adopt()
         if self._magnet is not None:
             self._magnet.update(stamp / SECOND)
 
-    def _end_tick(self, stamp: int) -> None:
-        """End a tick: forward the ground station's messages, publish the autopilot's state."""
+    def answer(self, stamp: int, setpoint: Setpoint) -> None:
+        """Publish the setpoint of the tick `stamp` [ns] as it was sent: the plant waits for it."""
+        self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
+
+    def send(self, stamp: int) -> None:
+        """End the tick `stamp` [ns]: forward the ground station's messages, publish the autopilot's
+        state, and thrust factor and lift if they are due."""
+        self._end_link(stamp)
+        if self.stage.lift_due:
+            self._factor_writer.position[0] = self.stage.factor
+            self._factor_writer.effort[0] = self.stage.lift
+            self._thrust.publish(self._factor_writer.stamped(stamp))
+
+    def _end_link(self, stamp: int) -> None:
         self._forward()
         self._autopilot.publish(stamp, self.stage.report)
 
@@ -307,9 +321,7 @@ class MavlinkBridgeNode(UamNode):
             return
         if (state - self._commanded) / SECOND >= self._options.stale_after:
             self._join.skip(state)
-            self._last_tick = time.monotonic()
-            setpoint = self._go_without(state, self._late_by(state))
-            self._setpoint.publish(self._writer.fill(state, *sent(setpoint)))
+            self.answer(state, self._go_without(state, self.begin_tick(state)))
             self.done_tick(state, time.perf_counter())
 
     def _watch(self) -> None:
@@ -327,13 +339,15 @@ class MavlinkBridgeNode(UamNode):
             self._forward()
         if self.ticks == 0 or silence < self._options.stale_after:
             return
-        self._go_without(self.stamp + round(silence * SECOND))
+        stamp = self.stamp + round(silence * SECOND)
+        self._begin_link(stamp)
+        self._go_without(stamp)
 
     def _go_without(self, stamp: int, late: float = 0.0) -> Setpoint:
-        """Run a tick at `stamp` [ns] without commands; return the setpoint sent."""
-        self._begin_tick(stamp, late)
+        """End a tick at `stamp` [ns] without commands, which has begun; return the setpoint."""
+        self.stage.hear(stamp, late)
         setpoint = self.stage.without(stamp)
-        self._end_tick(stamp)
+        self._end_link(stamp)
         return setpoint
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:

@@ -71,7 +71,7 @@ class DirectFlight:
             BridgeSets.of(described, section), described, self.autopilot, self.sequence
         )
         timing = Timing(self.plant.period)
-        self.control = ControlTick(scenario, sets, bridge, timing, described)
+        self.control = ControlTick.of(scenario, sets, bridge, timing, described)
         if self._faults:
             self.control.insert("bridge", "faults", self._update_faults, decides=False)
         if self._faults and self._faults.link.timeline.all:
