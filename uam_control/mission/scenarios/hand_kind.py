@@ -62,7 +62,7 @@ PASSES = 1e-3  # [m, rad] of a curve through a file's rows
 LOOKS = 0.1  # [s] between two checks of a posture
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HandSource:
     """A task of the hand, and what it is flown with; where: for errors.
 

@@ -3,8 +3,8 @@
 The base is where the hand needs it: p = r - R f(alpha), with R from differential flatness, so from
 the acceleration of p itself. Near level, for a hand at the height f_z below the base, this is
 p + (f_z / g) p_ddot = r - f on the horizontal axes: an elliptic equation, whose bounded solution
-begins before the task does. Iterated along the whole trajectory with this equation as the
-preconditioner; the splines of the iterates have all derivatives that a motion needs.
+begins before the task does. Solved along the whole trajectory by Newton's method; the splines of
+its iterates have all derivatives that a motion needs.
 """
 
 from __future__ import annotations
@@ -113,6 +113,7 @@ def _solved(
         times = _grid(task.path, step / SAMPLES)
         wanted = _wanted(task, times)
         chi = wanted.copy()
+        chi[:, PITCH] = 0.0  # the task's elevation
         if base is None:
             chi[:, POSITION] -= hands(flyer.chain, _placed(chi))[:, POSITION]
         else:
@@ -127,11 +128,10 @@ def _solved(
                 break
             chi = motion.rows(times, 1)[CHI]
             corrected(chi, flown, off)
-        where, far = _worst(motion, task, flyer)
-        if far <= 1.0:
+        misses = _missed(motion, task, flyer)
+        if not misses:
             return motion
-    text = f"the hand is {1e3 * MEETS * far:.3g} mm off its task at {where:.1f} s"
-    raise Unreachable(text)
+    raise Unreachable(misses)
 
 
 def flat(motion: Polynomials, times: np.ndarray, flyer: Flyer) -> Sampled:
@@ -208,11 +208,14 @@ def _least(slopes: np.ndarray, off: np.ndarray) -> np.ndarray:
     return (slopes.swapaxes(1, 2) @ solved)[:, :, 0]
 
 
-def _worst(motion: Polynomials, task: Task, flyer: Flyer) -> tuple[float, float]:
-    """Return when [s] the hand of a motion is farthest off its task, and by how many times MEETS
-    or MEETS_ANGLE."""
+def _missed(motion: Polynomials, task: Task, flyer: Flyer) -> str:
+    """Return by how much the hand of a motion is off its task, and when; "" if it meets it."""
     times = _grid(task.path, KNOTS[-1] / SAMPLES)
     off = np.abs(_off(flat(motion, times, flyer).chi, _wanted(task, times), task, flyer))
-    far = (off / [*[MEETS] * 3, MEETS_ANGLE, MEETS_ANGLE]).max(axis=1)
-    worst = int(np.argmax(far))
-    return float(times[worst] - times[0]), float(far[worst])
+    far = off / [*[MEETS] * 3, MEETS_ANGLE, MEETS_ANGLE]
+    worst, column = np.unravel_index(np.argmax(far), far.shape)
+    if far[worst, column] <= 1.0:
+        return ""
+    by = 1e3 * np.linalg.norm(off[worst, POSITION]), np.degrees(off[worst, column])
+    amount = f"{by[0]:.3g} mm" if column < HEADING else f"{by[1]:.3g} deg"
+    return f"the hand is {amount} off its task at {times[worst] - times[0]:.1f} s"
