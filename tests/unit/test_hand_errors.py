@@ -109,5 +109,5 @@ def test_figures_show_the_hand_of_a_vehicle_that_has_one(tmp_path):
     reference, true = (line.get_xdata() for line in above.lines)
     np.testing.assert_allclose(true - reference, [0.03, 0.03, 0.03])
     without = [DrawnFlight("modular", flight())]
-    without[0].series.columns = timeseries.columns_of(load_description())
+    without[0].series.columns = timeseries.columns(2, 4)
     assert figures.draw(without, tmp_path, names=names) == []

@@ -123,8 +123,9 @@ def columns(joints: int, rotors: int, hand: bool = False) -> Columns:
 
 
 def columns_of(vehicle: VehicleDescription) -> Columns:
-    """Return the columns of a vehicle, without those of an end effector."""
-    return columns(len(vehicle.joints), len(vehicle.rotors))
+    """Return the columns of a vehicle."""
+    hand = Flyer.with_hand(vehicle) is not None
+    return columns(len(vehicle.joints), len(vehicle.rotors), hand)
 
 
 def gain_columns(subsystem: str, names: Iterable[str], found: Columns) -> np.ndarray:
@@ -142,9 +143,7 @@ class FlightTable:
     @classmethod
     def of(cls, capacity: int, vehicle: VehicleDescription) -> FlightTable:
         """Return a table for a vehicle, with its end effector if it has one."""
-        flyer = Flyer.with_hand(vehicle)
-        joints, rotors = len(vehicle.joints), len(vehicle.rotors)
-        return cls(capacity, columns(joints, rotors, flyer is not None), flyer)
+        return cls(capacity, columns_of(vehicle), Flyer.with_hand(vehicle))
 
     def __init__(self, capacity: int, columns: Columns, flyer: Flyer | None = None):
         """flyer: of the end effector, None without."""
