@@ -68,9 +68,13 @@ def test_a_vehicle_without_a_hand(tmp_path, capsys):
         (tmp_path / "parts" / file.name).write_text(text)
     (tmp_path / "own.xml").write_text((folder / "s500_arm.xml").read_text())
     text = (folder / "s500_arm.yaml").read_text().replace("model: s500_arm.xml", "model: own.xml")
+    named, text = text, text.replace("end_effector: magnet_face", "")
     (tmp_path / "own.yaml").write_text(text)
     words = ["hand", "fk", "--vehicle", str(tmp_path / "own.yaml"), "--joints", "0,0"]
     assert main(words) == 2
     assert "no end effector: name a site of own.xml" in capsys.readouterr().err
+    (tmp_path / "own.yaml").write_text(named)
+    assert main(words) == 2
+    assert "own.xml: no site 'magnet_face'" in capsys.readouterr().err
     (tmp_path / "own.yaml").write_text(text + "end_effector: nose\n")
     assert main(words) == 0
