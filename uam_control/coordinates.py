@@ -5,7 +5,8 @@ chi, chi_dot and chi_ddot; the columns are:
 
 - chi[POSITION]: position in the world frame (ENU) [m]
 - chi[ATTITUDE]: roll, pitch, yaw (Z-Y-X Euler angles of the body, FLU) [rad]
-- chi[ARM]: joint angles, 0 = link straight down, positive swings forward [rad]
+- chi[ARM]: joint angles, zeros and signs as in the MJCF; of the S-500's arm 0 = link straight
+  down, positive swings forward [rad]
 
 chi_dot[ATTITUDE] contains the body rates [rad/s] and chi_ddot[ATTITUDE] their derivative [rad/s^2]
 (quasi-velocities in FLU). A gyroscope measures these, and Lee's error e_Omega uses them. In level

@@ -78,3 +78,33 @@ def test_a_vehicle_without_a_hand(tmp_path, capsys):
     assert "own.xml: no site 'magnet_face'" in capsys.readouterr().err
     (tmp_path / "own.yaml").write_text(text + "end_effector: nose\n")
     assert main(words) == 0
+
+
+def test_angles_for_a_place_and_back(capsys):
+    """0.1 m and 0.14 m to the pivot: forward and down by a right angle; the face 30 mm below."""
+    place = ["--position", "0.1", "0", str(-0.073 - 0.14 - 0.03)]
+    assert main(["hand", "ik", *place, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["distance_m"] < 1e-6 and not found["beyond_range"]
+    first, second = found["joints_rad"]
+    assert 0.1 * math.sin(first) + 0.14 * math.sin(first + second) == pytest.approx(0.1)
+    assert 0.1 * math.cos(first) + 0.14 * math.cos(first + second) == pytest.approx(0.14)
+    # 0.24 m is the longest reach: from 1 m straight below the mount the face is 0.73 m away
+    assert main(["hand", "ik", "--position", "0", "0", "-1.073", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["distance_m"] == pytest.approx(0.73)
+
+
+def test_the_workspace(tmp_path, capsys):
+    """A planar arm of 0.1 m and 0.14 m, straight down to both sides of the mount."""
+    picture = tmp_path / "reach.png"
+    assert main(["hand", "workspace", "--json", "--out", str(picture)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(found["lowest_m"], [-0.24, 0.0, -0.343], atol=2e-3)
+    assert found["highest_m"][:2] == pytest.approx([0.24, 0.0], abs=2e-3)
+    assert picture.stat().st_size > 10_000
+
+
+def test_what_an_action_needs_is_told(capsys):
+    for action, option in (("fk", "--joints"), ("ik", "--position")):
+        assert main(["hand", action]) == 2
+        assert f"{action} needs {option}" in capsys.readouterr().err

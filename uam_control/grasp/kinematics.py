@@ -1,15 +1,16 @@
-"""Position of the end effector in the world, and its levers, from the state."""
+"""The end effector in the world, and the levers of a weight there, from the state."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.kinematics import hand_jacobian, hand_pose
-from uam_control.coordinates import ALPHA, ROLL, X
+from uam_control.arm.hand import hand_in_world
+from uam_control.arm.kinematics import hand_jacobian
+from uam_control.coordinates import ALPHA, ROLL
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler
-from uam_control.maths.vectors import dot, rows, times, turned
+from uam_control.maths.vectors import dot, times, vector
 
 
 @jit
@@ -18,14 +19,11 @@ def hand_and_levers(chain: Chain, chi: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     chi (6 + n,): generalised coordinates. A weight there needs its lever in torque at the joint.
     """
-    rotation = rows(matrix_from_euler(chi[ROLL:ALPHA]))
-    up, angles = rotation[2], chi[ALPHA:]
-    position, _ = hand_pose(chain, angles, times(-1.0, up))
-    jacobian, hand, levers = np.empty((6, len(angles))), np.empty(3), np.empty(len(angles))
-    hand_jacobian(chain, angles, times(-1.0, up), jacobian)
-    place = turned(rotation, position)
-    for k in range(3):
-        hand[k] = chi[X + k] + place[k]
-    for i in range(len(angles)):
-        levers[i] = dot(up, (jacobian[0, i], jacobian[1, i], jacobian[2, i]))
+    place, _ = hand_in_world(chain, chi)
+    up, count = vector(matrix_from_euler(chi[ROLL:ALPHA])[2]), len(chi) - ALPHA
+    jacobian, hand, levers = np.empty((6, count)), np.empty(3), np.empty(count)
+    hand_jacobian(chain, chi[ALPHA:], times(-1.0, up), jacobian)
+    hand[0], hand[1], hand[2] = place
+    for i in range(count):
+        levers[i] = dot(up, vector(jacobian[:3, i]))
     return hand, levers
