@@ -208,8 +208,10 @@ class Feasibility:
                 (f"joint {i + 1} rate", rate, self.vehicle.servos[i].no_load_speed, "rad/s"),
                 (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
             ]
-        holding = self.vehicle.numbers["magnet"]["holding_force"]
-        return [*found, ("force on the magnet", demand.magnet_force, holding, "N")]
+        if self.vehicle.has_magnet:
+            holding = self.vehicle.numbers["magnet"]["holding_force"]
+            found.append(("force on the magnet", demand.magnet_force, holding, "N"))
+        return found
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
         """Return heights (m,) [m] of a vehicle that moves across, and sink rates (m,) [m/s] of one

@@ -127,6 +127,11 @@ class VehicleDescription:
         return self.profiles.get(law, "")
 
     @property
+    def has_magnet(self) -> bool:
+        """Whether the arm has a magnet."""
+        return "magnet" in self.numbers
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, base to tip."""
         return tuple(joint.name for joint in self.joints)

@@ -47,9 +47,13 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
         variation.positive(name)
     variation.numbers("payload_offset", 2)
     if variation.has("base_offset"):
-        variation.numbers("base_offset", 2)
+        variation.numbers("base_offset", 3 if len(variation.entry("base_offset")) == 3 else 2)
     if variation.has("tip_mass"):
         variation.not_negative("tip_mass")
+    if not top.has("magnet"):
+        if variation.number("tip_mass", default=0.0) > 0.0:
+            raise variation.error("tip_mass", "it hangs on a magnet, and there is no section magnet")
+        return
     magnet = top.section("magnet")
     magnet.positive("holding_force")
     magnet.positive("gap_scale")

@@ -66,7 +66,8 @@ class Body:
 
         # the free payload is a tree of its own, which is not evaluated
         self.rotor_names = vehicle.description.rotor_names
-        self.size = len(vehicle.description.coordinates)  # base and arm; the pivot follows them
+        self.size = len(vehicle.description.coordinates)  # base and arm; a pivot follows them
+        self.pivot = vehicle.description.has_magnet
         self.model = model = vehicle.compile(0.0, hold_payload)
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT
@@ -85,7 +86,9 @@ class Body:
         qpos[4] = sr * cp * cy - cr * sp * sy
         qpos[5] = cr * sp * cy + sr * cp * sy
         qpos[6] = cr * cp * sy - sr * sp * cy
-        qpos[7 : self.size + 1], qpos[self.size + 1] = chi[ALPHA:], swing
+        qpos[7 : self.size + 1] = chi[ALPHA:]
+        if self.pivot:
+            qpos[self.size + 1] = swing
 
     def evaluate(
         self,
@@ -107,7 +110,7 @@ class Body:
         data.qvel[:] = 0.0
         mujoco.mj_forward(model, data)
         gravity[:] = data.qfrc_bias[:size]
-        for i in range(size + 1):
+        for i in range(size + self.pivot):
             self._unit[i] = 1.0
             mujoco.mj_mulM(model, data, self._column, self._unit)
             self._unit[i] = 0.0
@@ -116,6 +119,9 @@ class Body:
         data.qvel[:size] = chi_dot
         mujoco.mj_fwdVelocity(model, data)
         coriolis[:] = data.qfrc_bias[:size] - gravity
+        if not self.pivot:
+            pivot[:] = 0.0
+            return
         pivot[:] = self._column[:size] * swing[2] - data.qfrc_bias[:size]
         data.qvel[size] = swing[1]
         mujoco.mj_fwdVelocity(model, data)

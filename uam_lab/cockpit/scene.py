@@ -80,7 +80,8 @@ class SceneNode(UamNode):
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]
         self._frame = partial(frame, self)
-        boxes = box(model, "magnet_face"), box(model, "payload")
+        face = box(model, "magnet_face") if described.has_magnet else None
+        boxes = face, box(model, "payload")
         self._maker = Markers(self._scenario, *boxes, self._frame(""))
 
         self._state: tuple[int, np.ndarray] | None = None

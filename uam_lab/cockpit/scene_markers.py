@@ -79,8 +79,9 @@ class FlownPath:
 class Markers:
     """Builds the MarkerArray of one stamp."""
 
-    def __init__(self, scenario: Scenario, face: Box, payload: Box, prefix: str = ""):
-        """face: of the magnet, in frame MAGNET; payload: in frame PAYLOAD; prefix: of frames."""
+    def __init__(self, scenario: Scenario, face: Box | None, payload: Box, prefix: str = ""):
+        """face: of the magnet, in frame MAGNET, None without one; payload: in frame PAYLOAD;
+        prefix: of frames."""
         self._drop, self._face, self._payload = scenario.drop_point, face, payload
         self._prefix = prefix
 
@@ -96,17 +97,18 @@ class Markers:
         markers = [
             _line(stamp, "reference path", ahead, AHEAD),
             _line(stamp, "flown path", flown, FLOWN),
-            self._magnet(stamp, status.magnet),
             _text(stamp, self._prefix + BODY, status),
         ]
+        if self._face is not None:
+            markers.append(self._magnet(stamp, self._face, status.magnet))
         if self._drop is not None:
             markers.append(_disc(stamp, self._drop))
         if payload:
             markers.append(_box(stamp, "payload", self._prefix + PAYLOAD, self._payload, CUBE))
         return MarkerArray(markers=markers)
 
-    def _magnet(self, stamp: int, on: bool) -> Marker:
-        around = Box(self._face.centre, self._face.edges + MAGNET_MARGIN)
+    def _magnet(self, stamp: int, face: Box, on: bool) -> Marker:
+        around = Box(face.centre, face.edges + MAGNET_MARGIN)
         colour = ENERGISED if on else OFF
         return _box(stamp, "magnet", self._prefix + MAGNET, around, colour)
 

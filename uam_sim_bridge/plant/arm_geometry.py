@@ -27,7 +27,8 @@ def room_below(
     data = _posed(model, joints, angles)
     _hang(model, data)
     base, first = model.body(BASE).id, model.joint(joints[0]).bodyid[0]
-    gear, arm = [], [float(data.site(FACE).xpos[2])]
+    ends = [name for name in (FACE, END_EFFECTOR) if has(model, mujoco.mjtObj.mjOBJ_SITE, name)]
+    gear, arm = [], [float(data.site(name).xpos[2]) for name in ends]
     for geom in np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0)):
         body = model.geom_bodyid[geom]
         if not _meets_the_world(model, geom):
@@ -36,14 +37,16 @@ def room_below(
             gear.append(_lowest(model, data, geom))
         elif _is_part(model, body, first):
             arm.append(_lowest(model, data, geom))
-    return min(arm) - min(gear) if gear else None
+    return min(arm) - min(gear) if gear and arm else None
 
 
-def tip_of(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Return the place (3,) [m, ENU] of the magnet's pivot, or of the end effector: a view."""
-    if has(model, mujoco.mjtObj.mjOBJ_BODY, MAGNET):
-        return data.xpos[model.body(MAGNET).id]
-    return data.site_xpos[model.site(END_EFFECTOR).id]
+def tip_of(model: mujoco.MjModel, data: mujoco.MjData, last: int) -> np.ndarray:
+    """Return the place (3,) [m, ENU] of the arm's tip, a view: the magnet's pivot, or the end
+    effector, or without both the body `last`."""
+    if has(model, mujoco.mjtObj.mjOBJ_SITE, END_EFFECTOR):
+        return data.site_xpos[model.site(END_EFFECTOR).id]
+    magnet = has(model, mujoco.mjtObj.mjOBJ_BODY, MAGNET)
+    return data.xpos[model.body(MAGNET).id if magnet else last]
 
 
 def has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
@@ -56,7 +59,8 @@ def _posed(model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]
     data = mujoco.MjData(model)
     base = model.joint(BASE).qposadr[0]
     data.qpos[base : base + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    data.joint(SWING).qpos = 0.0
+    if has(model, mujoco.mjtObj.mjOBJ_JOINT, SWING):
+        data.joint(SWING).qpos = 0.0
     for name, angle in zip(joints, angles, strict=True):
         data.joint(name).qpos = angle
     mujoco.mj_kinematics(model, data)
@@ -64,7 +68,9 @@ def _posed(model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]
 
 
 def _hang(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Turn the magnet's pivot so that its face is as low as possible."""
+    """Turn the magnet's pivot, if there is one, so that its face is as low as possible."""
+    if not has(model, mujoco.mjtObj.mjOBJ_JOINT, SWING):
+        return
     pivot = data.joint(SWING)
     way, axis = data.site(FACE).xpos - pivot.xanchor, pivot.xaxis
     along, across = way[2] - (way @ axis) * axis[2], np.cross(axis, way)[2]

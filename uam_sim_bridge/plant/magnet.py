@@ -15,6 +15,7 @@ import numpy as np
 from uam_control.maths.compiled import jit
 
 LAW = 4  # constants of the magnet's law
+NO_MAGNET = np.ones(LAW)  # its force is 0: nothing has its control
 
 
 def magnet_constants(

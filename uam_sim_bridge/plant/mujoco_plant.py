@@ -15,7 +15,7 @@ from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
 from uam_sim_bridge.plant.engine_step import error_text
-from uam_sim_bridge.plant.magnet import magnet_constants
+from uam_sim_bridge.plant.magnet import NO_MAGNET, magnet_constants
 from uam_sim_bridge.plant.observation import Observed, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
 from uam_sim_bridge.plant.physics import PhysicsArrays
@@ -31,7 +31,7 @@ from uam_sim_bridge.plant.sensors import (
     Noise,
     generators,
 )
-from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
+from uam_sim_bridge.plant.vehicle import BASE, FACE, MAGNET, PAYLOAD, SWING, Vehicle
 
 STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's solimp
 
@@ -57,8 +57,8 @@ class MujocoPlant(Plant):
         the ground, empty: stowed as described; disturbed: `disturb` will be called."""
         self.memory = record(WHOLE, REAL)
         super().__init__(vehicle)
-        numbers = vehicle.numbers
-        self.model = model = vehicle.compile(payload_mass, add_to if disturbed else None)
+        numbers, hinged = vehicle.numbers, disturbed and vehicle.description.has_magnet
+        self.model = model = vehicle.compile(payload_mass, add_to if hinged else None)
         self.data = data = mujoco.MjData(model)
         self._steps = round(self.period / model.opt.timestep)
         self._lay_out(payload_mass, arm_start or vehicle.description.stowed)
@@ -86,7 +86,7 @@ class MujocoPlant(Plant):
         self._specific_force = self._sensed_force.copy()
         self._added_wind = np.zeros(3)  # by disturbances
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
-        self._hinge = PayloadHinge(model, data) if disturbed else None
+        self._hinge = PayloadHinge(model, data) if hinged else None
         self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
         self.effects = ActingEffects(numbers["effects"], self._bench(), seed)
         self._unused_truth = np.empty(self.truth_row.width)
@@ -112,8 +112,6 @@ class MujocoPlant(Plant):
         self._alpha = data.qpos[arm_q : arm_q + self.joints]
         self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
         self._push = data.qfrc_applied[base_v : base_v + 6]
-        swing = joint(SWING).qposadr[0]
-        self._swing_angle = data.qpos[swing : swing + 1]
         payload_q = joint(PAYLOAD).qposadr[0]
         self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
@@ -125,20 +123,30 @@ class MujocoPlant(Plant):
         self._thrust_control = self._controls(described.rotor_names)
         self._torque_control = self._controls(names)
         self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
-        self.magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
-        self._magnet_control = self._controls((MAGNET,))
-        self._face = data.site_xpos[self.model.site("magnet_face").id]
         # of the same instant as the face: qpos is a physics step later
         self._payload_centre = data.xpos[self.model.body(PAYLOAD).id]
         self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
-        gripper = self.vehicle.numbers["magnet"]
-        curve = gripper.get("curve", ())
-        self._magnet_constants = magnet_constants(self.model, gripper["gap_scale"], curve)
         self._alpha[:] = arm_start
-        self._swing_angle[:] = -sum(arm_start)
+        self._lay_out_magnet(-sum(arm_start))
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # moved far away: the model stays the same
             self._payload_position[:] = (5.0, 5.0, 0.02)
+
+    def _lay_out_magnet(self, level: float) -> None:
+        """Store views of the magnet, which hangs at an angle [rad]; of an arm without one: zeros."""
+        self.magnet_gain, self._magnet_control = 0.0, np.zeros(1)
+        self._face, self._magnet_constants = np.zeros(3), NO_MAGNET
+        self._swing_angle = np.zeros(1)
+        if not self.vehicle.description.has_magnet:
+            return
+        swing, magnet = self.model.joint(SWING).qposadr[0], self.vehicle.numbers["magnet"]
+        self._swing_angle = self.data.qpos[swing : swing + 1]
+        self._swing_angle[:] = level
+        self._face = self.data.site_xpos[self.model.site(FACE).id]
+        self.magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
+        self._magnet_control = self._controls((MAGNET,))
+        curve = magnet.get("curve", ())
+        self._magnet_constants = magnet_constants(self.model, magnet["gap_scale"], curve)
 
     def _physics_arrays(self) -> PhysicsArrays:
         rotors, servos = self.rotors, self.servos
@@ -309,7 +317,8 @@ class MujocoPlant(Plant):
         model.dof_frictionloss[dofs] = friction + disturbance.joint_friction
         model.dof_solimp[dofs, 0:2] = np.where(braked[:, None], STIFF, softness[:, 0:2])
         self.magnet_gain = gain * disturbance.magnet_part
-        model.actuator_gainprm[model.actuator(MAGNET).id, 0] = self.magnet_gain
+        if self.vehicle.description.has_magnet:
+            model.actuator_gainprm[model.actuator(MAGNET).id, 0] = self.magnet_gain
         change = disturbance.wind - self._added_wind
         self.wind += change
         self._wind_mean += change

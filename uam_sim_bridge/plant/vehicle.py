@@ -23,7 +23,7 @@ from uam_control.vehicle import (
     VehicleError,
     load_description,
 )
-from uam_sim_bridge.plant.arm_geometry import BASE, MAGNET, SWING
+from uam_sim_bridge.plant.arm_geometry import BASE, FACE, MAGNET, SWING
 from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
@@ -107,17 +107,20 @@ class Vehicle:
         """Raise VehicleError if a part that the plant finds by name is not in the MJCF."""
         described = self.description
         joints = {joint.name for joint in spec.joints}
+        body, swing, face = (
+            ((MAGNET,), (SWING,), (FACE,)) if described.has_magnet else ((), (), ())
+        )
         for kind, required, there in (
-            ("body", (BASE, MAGNET), {body.name for body in spec.bodies}),
-            ("joint", (BASE, SWING, *described.joint_names), joints),
-            ("site", ("imu", "magnet_face"), {site.name for site in spec.sites}),
-            ("geom", ("magnet_face",), {g.name for g in spec.geoms}),
+            ("body", (BASE, *body), {body.name for body in spec.bodies}),
+            ("joint", (BASE, *swing, *described.joint_names), joints),
+            ("site", ("imu", *face), {site.name for site in spec.sites}),
+            ("geom", face, {g.name for g in spec.geoms}),
             ("sensor", ("specific_force", "body_rates"), {s.name for s in spec.sensors}),
         ):
             missing = [name for name in required if name not in there]
             if missing:
                 raise VehicleError(f"{described.model}: no {kind} '{missing[0]}'")
-        strange = sorted(joints - {BASE, PAYLOAD, SWING, *described.joint_names})
+        strange = sorted(joints - {BASE, PAYLOAD, *swing, *described.joint_names})
         if strange:
             raise VehicleError(
                 f"{described.model}: joint '{strange[0]}' is not in {described.file.name}, "
@@ -166,6 +169,8 @@ class Vehicle:
         for name in described.joint_names:
             motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             motor.set_to_motor()
+        if not described.has_magnet:
+            return
         magnet = spec.add_actuator(
             name=MAGNET, target=MAGNET, trntype=mujoco.mjtTrn.mjTRN_BODY, ctrlrange=(0.0, 1.0)
         )

@@ -62,6 +62,8 @@ def load_scenario(
         raise ScenarioError(f"{file}: a name that ends in {', '.join(FORMS)} expected")
     scenario = read(file, vehicle, options).slowed(options.slowdown)
     check_length(scenario.landing.end, f"{file}: the flight")
+    if any(on for _, on in scenario.magnet) and not vehicle.has_magnet:
+        raise ScenarioError(f"{file}: magnet: {vehicle.name} has none; allowed: a scenario without")
     return scenario
 
 

@@ -16,7 +16,7 @@ from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import style
 from uam_lab.report.figures.panels import DrawnFlight, corner_legend, flight_keys
 from uam_lab.report.figures.poses import Poses
-from uam_sim_bridge.plant.vehicle import BASE, MAGNET
+from uam_sim_bridge.plant.vehicle import BASE, FACE, MAGNET
 
 POSES = 5
 DASHES = (0, (3, 2))  # of the reference
@@ -137,12 +137,15 @@ def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
         middle = feet.mean(axis=0)
         leg = ([base[0], middle[0]], [base[2], middle[2]])
         axis.plot(*leg, color=style.MUTED, linewidth=1.0, **fade)
-    joints = [*poses.arm(), poses.body(MAGNET)]
-    chain = np.array([base, *joints, poses.site("magnet_face")])
+    described = poses.vehicle.description
+    tip = [poses.body(MAGNET)] if described.has_magnet else []
+    face = FACE if described.has_magnet else described.end_effector
+    hand = [poses.site(face)] if face else []
+    chain = np.array([base, *poses.arm(), *tip, *hand])
     axis.plot(chain[:, 0], chain[:, 2], color="#5b6670", linewidth=2.0, **fade)
     axis.plot(
-        chain[1:-1, 0],
-        chain[1:-1, 2],
+        chain[1 : len(chain) - len(hand), 0],
+        chain[1 : len(chain) - len(hand), 2],
         linestyle="none",
         marker="o",
         markersize=2.8,

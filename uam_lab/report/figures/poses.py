@@ -30,7 +30,8 @@ class Poses:
         joint = self.model.joint
         self._base, self._payload = (joint(n).qposadr[0] for n in (BASE, PAYLOAD))
         self._arm = joint(self.vehicle.description.joint_names[0]).qposadr[0]
-        self._swing = joint(SWING).qposadr[0]
+        magnet = self.vehicle.description.has_magnet
+        self._swing = joint(SWING).qposadr[0] if magnet else None
 
     def put(self, row: int) -> None:
         """Set the model to the pose in `row` of the series."""
@@ -39,7 +40,8 @@ class Poses:
         qpos[self._base : self._base + 3] = chi[POSITION]
         qpos[self._base + 3 : self._base + 7] = quaternion_from_euler(chi[ATTITUDE])
         qpos[self._arm : self._arm + columns.joints] = chi[ARM]
-        qpos[self._swing] = np.nan_to_num(values[columns["magnet.swing"]])
+        if self._swing is not None:
+            qpos[self._swing] = np.nan_to_num(values[columns["magnet.swing"]])
         payload = values[columns.block("payload.")]
         if not self.has_payload or np.isnan(payload).any():
             payload = (*OUT_OF_SIGHT, 1.0, 0.0, 0.0, 0.0)

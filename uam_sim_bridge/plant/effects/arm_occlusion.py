@@ -188,6 +188,6 @@ class _Occlusion(Acting):
         )
         self.arrays = OcclusionArrays(
             *(bench.pose, bench.memory, bench.base_position, bench.base_axes),
-            *(markers, cameras, errors, data.xpos, chain, tip_of(model, data), payload),
+            *(markers, cameras, errors, data.xpos, chain, tip_of(model, data, chain[-1]), payload),
             *(np.zeros((len(chain) + 2, 3)), np.zeros(len(markers), dtype=np.bool_), thickness),
         )
