@@ -25,6 +25,8 @@ from uam_control.offboard.sequence import (
     Reported,
     Request,
 )
+from uam_control.setpoints.attitude_target import RATES as RATES_ALONE
+from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.autopilot_port import PortSteps
@@ -37,7 +39,17 @@ from uam_sim_bridge.autopilot.core import (
     fly_rates,
     take_vision,
 )
+from uam_sim_bridge.autopilot.late_messages import (
+    POSE,
+    RATES,
+    LateArrays,
+    LateMessages,
+    arrives,
+    push,
+    take,
+)
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
+from uam_sim_bridge.plant.effects.network_delay import DelayArrays, SetpointDelay, late_at
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
 
@@ -71,12 +83,15 @@ REAL = "now period received_at delivered heartbeat_due landed_due late_to late_f
 
 class PortArrays(NamedTuple):
     """State of a `JoinedAutopilot`. numbers (1,): see WHOLE, REAL; gyro, force (3,): newest sample,
-    FRD."""
+    FRD; message: for one that is sent."""
 
     numbers: np.ndarray
     autopilot: CycleArrays
     gyro: np.ndarray
     force: np.ndarray
+    network: DelayArrays
+    late: LateArrays
+    message: np.ndarray
 
 
 class JoinedAutopilot(FlightState):
@@ -90,8 +105,14 @@ class JoinedAutopilot(FlightState):
     _now, _period, _received_at, _delivered = (Number() for _ in range(4))
     _heartbeat_due, _landed_due, time = (Number() for _ in range(3))
 
-    def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
-        """sequence: of the bridge; it receives answers and texts."""
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        sequence: OffboardSequence,
+        network: SetpointDelay | None = None,
+    ) -> None:
+        """sequence: of the bridge; it receives answers and texts; network: of all messages to the
+        autopilot, None: without delay."""
         super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
@@ -102,7 +123,9 @@ class JoinedAutopilot(FlightState):
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
         self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
         self.late_from: Callable[[], float] = at_once  # [s] of a message of the autopilot
-        self._outgoing: deque[tuple[float, Callable[[], None]]] = deque()  # due [s], delivers it
+        self.network = network or SetpointDelay(0.0, 0.0, 0.0, 0)
+        self._late, self._message = LateMessages(), np.zeros(8)
+        self._arrivals = {POSE: self._pose, RATES: self._rates}
         self._incoming: deque[tuple[float, _Received]] = deque()
         self._own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
         self._swap = prepared(swap_sample, *self._own_sample, *self._own_sample)
@@ -120,7 +143,7 @@ class JoinedAutopilot(FlightState):
 
     @property
     def steps(self) -> PortSteps | None:
-        """See `AutopilotPort`: only of a link that loses and delays no message."""
+        """See `AutopilotPort`: only of a link that has no faults."""
         link = self.passes, self.receives, self.late_to, self.late_from
         usual = type(self) is JoinedAutopilot and type(self.autopilot) is Autopilot
         return STEPS if usual and link == (always, always, at_once, at_once) else None
@@ -128,14 +151,18 @@ class JoinedAutopilot(FlightState):
     @property
     def arrays(self) -> PortArrays:
         """What compiled ticks use."""
-        return PortArrays(self.memory, self.autopilot.arrays, *self._own_sample)
+        return PortArrays(
+            *(self.memory, self.autopilot.arrays, *self._own_sample),
+            *(self.network.arrays, self._late.arrays, self._message),
+        )
 
     @property
     def settled(self) -> bool:
         """Whether the autopilot flies rates in OFFBOARD, and its next reports bring no change."""
         status, told = self.autopilot.status, self._told
         seen = self.armed, self.mode, self.landed, self.failsafe, self.intended, self.killed
-        waits = self._outgoing or self._incoming or self._answers or self.autopilot.commander.texts
+        texts = self.autopilot.commander.texts
+        waits = self._late.others or self._incoming or self._answers or texts
         return (
             self.autopilot.settled
             and not (waits or self.failsafe)
@@ -164,10 +191,9 @@ class JoinedAutopilot(FlightState):
         gap between two ticks is no round trip.
         """
         self._begin_poll(self.memory, time)
-        late_to, late_from = self.late_to(), self.late_from()
+        late_to, late_from = self._delay(), self.late_from()
         self.memory["late_to"], self.memory["late_from"] = late_to, late_from
-        while self._outgoing and self._outgoing[0][0] <= time + 1e-9:
-            self._outgoing.popleft()[1]()
+        self._late.arrive(time, self._arrivals)
         texts = self.autopilot.commander.texts
         if self._answers or texts or self._heartbeat or self._landed:
             self._take(time, late_from, self.autopilot.commander.take_texts())
@@ -213,28 +239,46 @@ class JoinedAutopilot(FlightState):
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
-        position, quaternion = swap_world(pose.position), swap_quaternion(pose.quaternion)
-        self._send(lambda: self._vision(pose.stamp, position, quaternion))
+        self._send_values(POSE, np.array([pose.stamp, *pose.position, *pose.quaternion]))
 
     def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
-        if self.passes is always and self.late_to is at_once and not self._outgoing:
-            self._target(target)
+        if isinstance(target, AttitudeTarget) and target.type_mask == RATES_ALONE:
+            self._send_values(RATES, np.array([*target.rates, target.thrust]))
         else:
             self._send(lambda: self._target(target))
+
+    def _delay(self) -> float:
+        """Return the delay [s] of a message that is sent now."""
+        return self.late_to() + self.network.at(self._now)
 
     def _send(self, deliver: Callable[[], object]) -> None:
         """Send a message: call `deliver` in the cycle in which it arrives, if it arrives."""
         if not self.passes():
             return
-        late = self.late_to()
-        if late or self._outgoing:
-            self._outgoing.append((self._now + late, deliver))
+        late = self._delay()
+        if late or self._late.count:
+            self._late.send(self._now + late, deliver)
         else:
             deliver()
 
-    def _vision(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        self.autopilot.vision(self.time, position, quaternion, age_by(stamp, self.time))
+    def _send_values(self, kind: int, values: np.ndarray) -> None:
+        """Send a message of values, as `_send`."""
+        if not self.passes():
+            return
+        late = self._delay()
+        if late or self._late.count:
+            self._late.send_values(self._now + late, kind, values)
+        else:
+            self._arrivals[kind](values)
+
+    def _pose(self, values: np.ndarray) -> None:
+        position, quaternion = swap_world(values[1:4]), swap_quaternion(values[4:8])
+        age = age_by(values.item(0), self.time)
+        self.autopilot.vision(self.time, position, quaternion, age)
+
+    def _rates(self, values: np.ndarray) -> None:
+        self._target(AttitudeTarget.of_rates(values[:3], values.item(3)))
 
     def _command(self, request: Request) -> None:
         command, parameters = self.sequence.commands[request]
@@ -290,7 +334,7 @@ def ready(a: PortArrays, now: float) -> bool:
     """See `PortSteps`."""
     m = a.numbers[0]
     silent = not (m.heartbeat or m.landed) and now - m.received_at > LINK_GAP
-    return not silent and now - m.delivered <= LINK_GAP
+    return not silent and now - m.delivered <= LINK_GAP and a.late.numbers[0].others == 0
 
 
 @borrowing
@@ -298,27 +342,58 @@ def poll(a: PortArrays, now: float) -> None:
     """Do what `JoinedAutopilot.poll` does where no report brings a change."""
     m = a.numbers[0]
     begin_poll(a.numbers, now)
-    m.late_to = m.late_from = 0.0
+    m.late_to, m.late_from = late_at(a.network, now), 0.0
+    while arrives(a.late, now):
+        row = take(a.late)
+        if a.late.kinds[row] == POSE:
+            take_pose(a, a.late.values[row])
+        else:
+            take_rates(a, a.late.values[row])
     if m.heartbeat or m.landed:
         m.received_at, m.heartbeat, m.landed = now, 0, 0
 
 
 @jit
+def take_pose(a: PortArrays, values: np.ndarray) -> None:
+    """Deliver a POSE of `late_messages`."""
+    time = a.numbers[0].time
+    position, quaternion = swap_world(values[1:4]), swap_quaternion(values[4:8])
+    take_vision(time, position, quaternion, age_by(values[0], time), a.autopilot.estimator)
+
+
+@borrowing
+def take_rates(a: PortArrays, values: np.ndarray) -> None:
+    """Deliver RATES of `late_messages`."""
+    m, setpoint = a.numbers[0], a.autopilot.setpoint
+    for i in range(3):
+        setpoint[i] = values[i]
+    setpoint[3] = min(1.0, max(0.0, values[3]))
+    take_setpoint(a.autopilot.commander, m.time)
+    m.delivered = m.now
+
+
+@borrowing
 def send_vision(a: PortArrays, exposed: float, pose: np.ndarray) -> None:
     """See `PortSteps`."""
-    time = a.numbers[0].time
-    position, quaternion = swap_world(pose[:3]), swap_quaternion(pose[3:])
-    take_vision(time, position, quaternion, age_by(exposed, time), a.autopilot.estimator)
+    m, values = a.numbers[0], a.message
+    values[0] = exposed
+    for i in range(7):
+        values[1 + i] = pose[i]
+    if m.late_to > 0.0 or a.late.numbers[0].count > 0:
+        push(a.late, m.now + m.late_to, POSE, values)
+    else:
+        take_pose(a, values)
 
 
 @borrowing
 def send_setpoint(a: PortArrays, now: float, rates: np.ndarray, thrust: float) -> None:
     """See `PortSteps`."""
-    m, setpoint = a.numbers[0], a.autopilot.setpoint
-    setpoint[0], setpoint[1], setpoint[2] = rates[0], -rates[1], -rates[2]
-    setpoint[3] = min(1.0, max(0.0, thrust))
-    take_setpoint(a.autopilot.commander, m.time)
-    m.delivered = now
+    m, values = a.numbers[0], a.message
+    values[0], values[1], values[2], values[3] = rates[0], -rates[1], -rates[2], thrust
+    if m.late_to > 0.0 or a.late.numbers[0].count > 0:
+        push(a.late, now + m.late_to, RATES, values)
+    else:
+        take_rates(a, values)
 
 
 STEPS = PortSteps(ready, poll, send_vision, send_setpoint)

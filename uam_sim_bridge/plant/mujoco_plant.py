@@ -133,7 +133,7 @@ class MujocoPlant(Plant):
             self._payload_position[:] = (5.0, 5.0, 0.02)
 
     def _lay_out_magnet(self, level: float) -> None:
-        """Store views of the magnet, which hangs at an angle [rad]; of an arm without one: zeros."""
+        """Store views of the magnet, which hangs at an angle [rad]; zeros without a magnet."""
         self.magnet_gain, self._magnet_control = 0.0, np.zeros(1)
         self._face, self._magnet_constants = np.zeros(3), NO_MAGNET
         self._swing_angle = np.zeros(1)

@@ -107,9 +107,7 @@ class Vehicle:
         """Raise VehicleError if a part that the plant finds by name is not in the MJCF."""
         described = self.description
         joints = {joint.name for joint in spec.joints}
-        body, swing, face = (
-            ((MAGNET,), (SWING,), (FACE,)) if described.has_magnet else ((), (), ())
-        )
+        body, swing, face = ((MAGNET,), (SWING,), (FACE,)) if described.has_magnet else ((), (), ())
         for kind, required, there in (
             ("body", (BASE, *body), {body.name for body in spec.bodies}),
             ("joint", (BASE, *swing, *described.joint_names), joints),

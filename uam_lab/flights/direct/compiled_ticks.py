@@ -9,8 +9,8 @@ A step that has something to decide changes nothing, and says so. Then the loop 
 objects do this stage and the rest of the tick. So all decisions are made by the objects, and a
 recording is the same bit for bit (tests/flights/test_compiled_ticks.py).
 
-A part of the tick without a compiled step (a fault, the effects of the laboratory, a law or a
-setpoint of somebody's own) splits the loop: Python goes from part to part, tick by tick.
+A part of the tick without a compiled step (a fault, a law, an effect or a setpoint of
+somebody's own) splits the loop: Python goes from part to part, tick by tick.
 """
 
 from __future__ import annotations
@@ -211,6 +211,7 @@ class CompiledTicks:
         control, plant = self._flight.control, self._flight.plant
         if self._compiled_plant:
             most = min(most, plant.draw_noise())
+        most = min(most, self._flight.autopilot.network.draw())
         left = control.bridge.reports.next - control.signals.stamp
         to_report = max(1, -(-left // control.mission.period))
         return control.mission.look_ahead(min(most, self._flight.recorder.left, to_report))

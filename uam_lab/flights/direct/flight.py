@@ -66,7 +66,8 @@ class DirectFlight:
         check_names(profile)
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         stand_in = Autopilot(Parameters.of(described), spoken=self.sequence.firmware)
-        self.autopilot = JoinedAutopilot(stand_in, self.sequence)
+        network = SetpointDelay.of(vehicle.numbers["effects"], seed)
+        self.autopilot = JoinedAutopilot(stand_in, self.sequence, network)
         bridge = BridgeStage(
             BridgeSets.of(described, section), described, self.autopilot, self.sequence
         )
@@ -79,9 +80,6 @@ class DirectFlight:
             self.autopilot.receives = self._faults.link.receives
             self.autopilot.late_to = self._faults.link.late_to
             self.autopilot.late_from = self._faults.link.late_from
-        if network := SetpointDelay.of(vehicle.numbers["effects"], seed):
-            usual, signals = self.autopilot.late_to, self.control.signals
-            self.autopilot.late_to = lambda: usual() + network.at(signals.stamp / SECOND)
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
         self._complete = False  # every kind of sensor has delivered

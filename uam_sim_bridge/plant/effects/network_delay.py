@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
+from uam_control.maths.memory import record
 from uam_control.settings.json_text import read_mapping
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
-from uam_sim_bridge.plant.sensors import Noise, next_row
-
-BLOCK = 4096  # draws per call of the generator; the sequence is the same for any
+from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
 class NetworkDelay(Effect):
@@ -56,16 +56,26 @@ class _PoseDelay(Acting):
         self.arrays = bench.memory, self.noises[0].arrays, p.mocap, p.longest
 
 
+class DelayArrays(NamedTuple):
+    """added: noise [s]; numbers (1,): now [s], the newest tick, late [s], its delay, fixed, longest
+    [s]."""
+
+    added: NoiseArrays
+    numbers: np.ndarray
+
+
 class SetpointDelay:
     """Delay of the messages to the autopilot; all messages of a tick are equally late."""
 
     def __init__(self, fixed: float, jitter: float, longest: float, seed: int) -> None:
         """fixed, jitter, longest: see `NetworkDelay` [s]; seed: of the flight."""
         self._numbers = {"fixed": fixed, "jitter": jitter, "longest": longest, "seed": seed}
-        self._fixed, self._jitter, self._longest = fixed, jitter, longest
-        self._noise = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0x5E7,)))
-        self._draws = iter(())
-        self._time, self._late = -1.0, fixed  # [s] newest tick, its delay
+        noise = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0x5E7,)))
+        self._added = Noise(noise, np.array([jitter]), "standard_exponential")
+        memory = record("", "now late fixed longest")
+        memory[0] = -1.0, fixed, fixed, longest
+        self.arrays = DelayArrays(self._added.arrays, memory)
+        self._at = bound(late_at, self.arrays, 0.0)
 
     @classmethod
     def of(cls, effects: Mapping[str, Mapping[str, float]], seed: int) -> Self | None:
@@ -91,16 +101,21 @@ class SetpointDelay:
         """Return it as text for a parameter."""
         return json.dumps(self._numbers)
 
+    def draw(self) -> int:
+        """Draw the noise that is due; return for how many ticks it lasts."""
+        return self._added.draw()
+
     def at(self, time: float) -> float:
         """Return the delay [s] of the messages of the tick `time` [s]; ticks in order of time."""
-        if time > self._time:
-            self._time = time
-            self._late = self._fixed + min(self._longest, self._jitter * self._drawn())
-        return self._late
+        self._added.draw()
+        return self._at(time)
 
-    def _drawn(self) -> float:
-        value = next(self._draws, None)
-        if value is None:
-            self._draws = iter(self._noise.standard_exponential(BLOCK).tolist())
-            value = next(self._draws)
-        return value
+
+@borrowing
+def late_at(a: DelayArrays, time: float) -> float:
+    """See `SetpointDelay.at`."""
+    m = a.numbers[0]
+    if time > m.now:
+        m.now = time
+        m.late = m.fixed + min(m.longest, a.added.rows[next_row(a.added), 0])
+    return m.late
