@@ -32,6 +32,7 @@ from uam_control.supervision import Authority
 from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 MS = 1_000_000  # [ns]
 PERIOD = 4 * MS
@@ -221,9 +222,9 @@ def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
 class Joined:
     """A joined autopilot at rest, tick by tick, poses coming in."""
 
-    def __init__(self):
+    def __init__(self, network=None):
         self.sequence = OffboardSequence()
-        self.port = JoinedAutopilot(Autopilot(), self.sequence)
+        self.port = JoinedAutopilot(Autopilot(), self.sequence, network)
         self.sequence.set_desired(True)
         self.ticks = 0
 
@@ -276,6 +277,36 @@ def test_messages_of_the_joined_autopilot_are_late_in_order():
     arrived = [(round(at - start, 3), round(thrust, 1)) for at, thrust in seen]
     assert arrived == [(0.012, 0.0), (0.012, 0.1), (0.012, 0.2), (0.012, 0.3), (0.016, 0.4)]
     assert rig.port.round_trip == pytest.approx(0.024)
+
+
+def test_compiled_steps_of_the_joined_autopilot_are_late_as_its_methods():
+    rigs = [Joined(SetpointDelay(0.003, 0.004, 0.03, 5)) for _ in range(2)]
+    for rig in rigs:
+        rig.run(2.0)
+    assert all(rig.port.armed and rig.port.steps.ready(rig.port.arrays, 1.996) for rig in rigs)
+    seen = [[], []]
+    for tick in range(rigs[0].ticks, rigs[0].ticks + 200):
+        time, rates = 0.004 * tick, np.array([0.01, 0.02, 0.03]) * tick
+        for i, (rig, found) in enumerate(zip(rigs, seen, strict=True)):
+            port = rig.port
+            port.time = time
+            port.network.draw()
+            pose = 1e-3 * tick * np.ones(3)
+            target = AttitudeTarget.of_rates(rates * [1, -1, -1], 1e-3 * tick)
+            if i == 0:
+                port.poll(time)
+                port.send_vision(VisionPose(time, pose, LEVEL, 0.01, 0.01))
+                port.send_setpoint(target, time)
+            else:
+                port.steps.poll(port.arrays, time)
+                port.steps.send_vision(port.arrays, time, np.array([*pose, *LEVEL]))
+                port.steps.send_setpoint(port.arrays, time, rates, target.thrust)
+            port.update(time, REST, WEIGHT)
+            newest = port.autopilot.estimator.arrays.estimate
+            found.append((*port.arrays.autopilot.setpoint, port.round_trip, *newest))
+    assert seen[0] == seen[1]
+    late = [tick for tick, row in enumerate(seen[0]) if row[3] != pytest.approx(1e-3 * (500 + tick))]
+    assert len(late) > 150 and len({row[4] for row in seen[0]}) > 100  # they were late
 
 
 def test_late_reports_of_the_joined_autopilot():
