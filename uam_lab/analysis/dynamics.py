@@ -52,15 +52,21 @@ class Body:
         payload_mass: float = 0.0,
         payload_position: np.ndarray = (0.0, 0.0, -0.0505),
     ) -> None:
-        """payload_mass [kg]; payload_position (3,) [m]: centre, in the frame of the magnet."""
+        """payload_mass [kg]: at the magnet, or without one at the end effector; payload_position
+        (3,) [m]: centre, in the frame of the magnet."""
 
         def hold_payload(spec: mujoco.MjSpec) -> None:
-            if payload_mass > 0.0:
-                spec.body(MAGNET).add_geom(
+            described = vehicle.description
+            holder, place = spec.body(MAGNET), payload_position
+            if not described.has_magnet and described.end_effector:
+                hand = spec.site(described.end_effector)
+                holder, place = hand.parent, hand.pos
+            if payload_mass > 0.0 and holder is not None:
+                holder.add_geom(
                     name="held",
                     type=mujoco.mjtGeom.mjGEOM_BOX,
                     size=np.array(spec.geom(PAYLOAD).size),
-                    pos=np.array(payload_position, dtype=float),
+                    pos=np.array(place, dtype=float),
                     mass=payload_mass,
                 )
 
