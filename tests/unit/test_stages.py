@@ -305,7 +305,8 @@ def test_compiled_steps_of_the_joined_autopilot_are_late_as_its_methods():
             newest = port.autopilot.estimator.arrays.estimate
             found.append((*port.arrays.autopilot.setpoint, port.round_trip, *newest))
     assert seen[0] == seen[1]
-    late = [tick for tick, row in enumerate(seen[0]) if row[3] != pytest.approx(1e-3 * (500 + tick))]
+    sent = [pytest.approx(1e-3 * (500 + tick)) for tick in range(200)]
+    late = [row for row, thrust in zip(seen[0], sent, strict=True) if row[3] != thrust]
     assert len(late) > 150 and len({row[4] for row in seen[0]}) > 100  # they were late
 
 

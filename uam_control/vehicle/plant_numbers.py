@@ -52,9 +52,7 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
         variation.not_negative("tip_mass")
     if not top.has("magnet"):
         if variation.number("tip_mass", default=0.0) > 0.0:
-            raise variation.error(
-                "tip_mass", "hangs on a magnet; there is no section magnet"
-            )
+            raise variation.error("tip_mass", "hangs on a magnet; there is no section magnet")
         return
     magnet = top.section("magnet")
     magnet.positive("holding_force")
