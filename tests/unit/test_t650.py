@@ -1,14 +1,14 @@
 """The T650 of another laboratory: belief in its vehicle file, truth in its presets."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from uam_control.arm.kinematics import DOWN, hand_pose, vehicle_centre
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.vehicle import chain_of
+from uam_control.settings import configuration
+from uam_control.vehicle import VehicleError, chain_of
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -74,9 +74,12 @@ def test_its_plants_stay_finite(preset):
     assert np.all(np.isfinite(one.truth().state)) and one.truth().magnet_force == 0.0
 
 
-def test_a_scenario_with_a_magnet_is_refused():
+def test_a_scenario_with_a_magnet_is_refused(tmp_path):
+    file, hover = tmp_path / "pick.yaml", configuration.named("scenarios", "hover").read_text()
+    file.write_text(hover + "magnet:\n  - {at: 5, energised: true}\n")
     with pytest.raises(ScenarioError, match="magnet: t650 has none"):
-        load_scenario("quick_pick", DESCRIBED)
+        load_scenario(str(file), DESCRIBED)
+    assert load_scenario(str(file)).magnet
 
 
 def test_a_vehicle_without_a_magnet_has_a_description_for_other_tools():
@@ -84,8 +87,5 @@ def test_a_vehicle_without_a_magnet_has_a_description_for_other_tools():
 
 
 def test_a_load_needs_a_magnet_to_hang_on():
-    numbers = VEHICLE.numbers["variation"] | {"tip_mass": 0.1}
-    with pytest.raises(Exception, match="tip_mass"):
-        Vehicle.of(replace(DESCRIBED, numbers=DESCRIBED.numbers | {"variation": numbers})).compile(
-            0.0
-        )
+    with pytest.raises(VehicleError, match=r"variation.tip_mass: 0.1 kg hang on the magnet"):
+        VEHICLE.changed({"variation.tip_mass": 0.1}).compile(0.0)

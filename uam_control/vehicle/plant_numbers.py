@@ -51,8 +51,6 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
     if variation.has("tip_mass"):
         variation.not_negative("tip_mass")
     if not top.has("magnet"):
-        if variation.number("tip_mass", default=0.0) > 0.0:
-            raise variation.error("tip_mass", "hangs on a magnet; there is no section magnet")
         return
     magnet = top.section("magnet")
     magnet.positive("holding_force")

@@ -200,6 +200,11 @@ class Vehicle:
             return
         vary(model, (mass, mass), (inertia, inertia), offset)
         if load:
+            if not self.description.has_magnet:
+                raise VehicleError(
+                    f"{self.description.file}: variation.tip_mass: {load:g} kg hang on the magnet; "
+                    "this vehicle has none: 0"
+                )
             _add_point_mass(model, model.body(MAGNET).id, load, LOAD_BELOW)
             mujoco.mj_setConst(model, mujoco.MjData(model))
 
