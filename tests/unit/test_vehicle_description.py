@@ -148,7 +148,7 @@ def test_the_hover_of_every_vehicle_is_in_the_range_of_the_autopilot():
     "key",
     [
         *("model", "mass", "rotors", "joints", "servos", "autopilot"),
-        *("air", "sensors", "variation", "magnet"),
+        *("air", "sensors", "variation"),
     ],
 )
 def test_what_is_missing_is_named(key):
