@@ -376,6 +376,16 @@ def test_an_mjcf_tells_thrust_and_turns_by_its_actuators(tmp_path):
     assert here.body("magnet").xpos - here.body("base").xpos == pytest.approx((0, 0, -0.17))
 
 
+def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):
+    with pytest.raises(ImportRefused, match=r"x2.xml line 5: <body pos='0 0 nan'>: finite numbers"):
+        imported(tmp_path, MJCF.replace('pos="0 0 -.05"', 'pos="0 0 nan"'), "x2.xml")
+
+
+def test_a_joint_with_a_name_of_ours_is_refused(tmp_path):
+    with pytest.raises(ImportRefused, match=r"joint 'base': another name is needed"):
+        imported(tmp_path, drone().replace("joint_0", "base"))
+
+
 def test_an_error_of_mujoco_names_file_and_line(tmp_path):
     with pytest.raises(ImportRefused, match=r"x2.xml.*line 2"):
         imported(tmp_path, MJCF.replace('type="box"', 'type="bax"'), "x2.xml")

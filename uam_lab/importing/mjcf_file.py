@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -17,6 +18,8 @@ from uam_lab.importing.source import (
 )
 
 DEEPEST = 10  # of includes
+ENDLESS = re.compile(r"(?i)(^|\s)[-+]?(nan|inf|infinity)(\s|$)")
+TEXTS = ("name", "class", "childclass", "file", "model")  # attributes without numbers
 KINDS = {"body": "body", "joint": "joint", "freejoint": "joint", "site": "site"}
 
 
@@ -50,6 +53,11 @@ def _note_lines(
         raise ImportRefused(f"{file}: includes more than {DEEPEST} deep")
     for one in root.iter(etree.Element):
         where = f"{file} line {one.sourceline}"
+        for key, value in one.attrib.items():
+            if key not in TEXTS and ENDLESS.search(value):
+                raise ImportRefused(
+                    f"{where}: <{one.tag} {key}={value!r}>: finite numbers expected"
+                )
         if one.tag == "include":
             inner = folder / (one.get("file") or "")
             if not inner.is_file():

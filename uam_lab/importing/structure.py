@@ -16,6 +16,7 @@ LONGEST_ARM = 7  # joints
 FINGER = re.compile(r"finger|jaw|claw|knuckle|gripper|hand|mimic", re.I)
 BASE = "base"  # body of a vehicle of this project
 OWN = ("payload", "stand", "drop_mat", "magnet")  # bodies of this project that it adds itself
+TAKEN = (BASE, "payload", "magnet_swing")  # joints of every vehicle
 TIPS = (r"^magnet$|magnet_face", "tool0|tcp|tool_tip", "end_?effector|eef|ee_link|(^|_)ee($|_)")
 TIPS += ("gripper|hand", "tool")
 LEVEL = 0.985  # cosine of the largest tilt of a rotor
@@ -219,6 +220,8 @@ def _joint_above(model: mujoco.MjModel, joint: int, moving: Sequence[int]) -> in
 def _check_joint(source: Source, model: mujoco.MjModel, chain: Sequence[int]) -> None:
     joint = chain[-1]
     name, kind = model.joint(joint).name, model.jnt_type[joint]
+    if name in TAKEN or not name:
+        raise source.error("joint", name, f"another name is needed: not {', '.join(TAKEN)}")
     if kind != HINGE:
         said = "prismatic" if kind == SLIDE else "floating" if kind == FREE else "a ball"
         raise source.error("joint", name, f"{said} joint in the arm; revolute ones are possible")
