@@ -254,6 +254,15 @@ def test_fingers_are_no_joints_of_the_arm(tmp_path):
     assert model.nu == 4 + 2 + 1
 
 
+def test_a_vehicle_may_have_no_magnet(tmp_path):
+    """The tool's place is a site then: 0.06 m below the base, and two links of 0.12 m."""
+    made, model = imported(tmp_path, drone(), chosen=Chosen(magnet=False))
+    assert made.description.mass == pytest.approx(1.7) and not made.description.has_magnet
+    here = posed(model, made.description.joint_names, (0.0, 0.0))
+    tool = here.site("end_effector").xpos - here.body("base").xpos
+    assert tool == pytest.approx((0.02, 0.0, -0.3))
+
+
 def test_of_two_arms_one_is_chosen(tmp_path):
     text = drone().replace("</robot>", SECOND_ARM)
     made, _ = imported(tmp_path, text, chosen=Chosen(arm="joint_0"))

@@ -57,6 +57,8 @@ def add(commands: Subcommands) -> None:
     command.option("--end-effector", "NAME", text, "")
     text = "vehicle whose arm hangs below a base without an arm"
     command.option("--arm-of", "NAME|FILE", text, "")
+    text = "hang no magnet of 0.07 kg at the end effector: nothing is picked"
+    command.switch("--no-magnet", text, "store_false", dest="magnet")
     command.switch("--no-questions", "assume what is not answered; the usual without a terminal")
     command.switch("--overwrite", "write into a folder that has such a vehicle")
 
@@ -76,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     asked = sys.stdin.isatty() and not options.no_questions
     answers = Answers(read_answers(options.answers, options.answer), _ask if asked else None)
     arm_of = load_description(options.arm_of) if options.arm_of else None
-    chosen = Chosen(options.base, options.arm, options.end_effector)
+    chosen = Chosen(options.base, options.arm, options.end_effector, options.magnet)
     made = importer.import_vehicle(options.file, folder, name, chosen, answers, arm_of)
     say("found:")
     for line in made.found:

@@ -122,7 +122,8 @@ def _found(parts: Parts, stance: Stance, mount: Told | None) -> Iterator[str]:
     yield f"arm: {len(parts.joints)} joints: {names}"
     if mount is not None:
         yield f"arm of another vehicle: at {mount.value} m ({mount})"
-    yield f"end effector: {parts.tip or 'far end of the last link'}; a magnet hangs there"
+    hangs = "; a magnet hangs there" if parts.magnet else ""
+    yield f"end effector: {parts.tip or 'far end of the last link'}{hangs}"
     names = ", ".join(dict.fromkeys(one.name for one in parts.rotors))
     yield f"rotors: {len(parts.rotors)}: {names}"
     yield f"feet: {stance.legs}"

@@ -25,6 +25,7 @@ KINDS = {
     geometry.SHAPES.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
     geometry.SHAPES.mjGEOM_BOX: ("box", 3),
 }
+END_EFFECTOR = "end_effector"  # its site, without a magnet
 NOTHING = 1e-12  # what rounding leaves of a zero
 BOOM, LEG = "0.010", "0.006"  # [m] radius
 HIDDEN = "3"  # geom group that is not drawn
@@ -83,10 +84,13 @@ class MjcfText:
             )
             self._body(body, link)
             above = body
-        place, axes = geometry.tip(parts)
-        magnet = etree.SubElement(
-            above, "body", name="magnet", pos=text(place), quat=text(quaternion(axes))
-        )
+        place, axes = geometry.tip(self.parts)
+        there = {"pos": text(place), "quat": text(quaternion(axes))}
+        if not self.parts.magnet:
+            site = {"name": END_EFFECTOR, "size": "0.004", "rgba": "0 0 0 0"}
+            etree.SubElement(above, "site", site | there)
+            return
+        magnet = etree.SubElement(above, "body", {"name": "magnet"} | there)
         etree.SubElement(magnet, "include", file="parts/magnet.xml")
 
     def _free_name(self, name: str, link: int) -> str:

@@ -33,6 +33,11 @@ def masses(parts: Parts) -> float:
     return sum(geometry.inertial(parts, link)[0] for link in range(len(parts.joints) + 1))
 
 
+def magnet_mass(parts: Parts) -> float:
+    """Return the mass [kg] of the magnet that the import adds."""
+    return MAGNET_MASS if parts.magnet else 0.0
+
+
 def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     """Return the section `rotors`."""
     assumed = answers.assumed
@@ -152,7 +157,7 @@ def servos_of(other: VehicleDescription) -> Servos:
 def servos_for(parts: Parts, answers: Answers, mass: float) -> Servos:
     """Return servos that hold the arm outstretched: one type, unless an answer says others."""
     assumed, types = answers.assumed, servo_types()
-    load = MAGNET_MASS + assumed.number("payload_share") * mass
+    load = magnet_mass(parts) + assumed.number("payload_share") * mass
     needs = geometry.holding_torques(parts, load, GRAVITY)
     need, share = float(needs.max()), assumed.number("servo_share")
     fitting = [
@@ -211,7 +216,7 @@ def document(
     servos: Servos,
 ) -> Tree:
     """Return the content of the YAML file; the mass is that of the links and the magnet."""
-    mass = masses(parts) + MAGNET_MASS
+    mass = masses(parts) + magnet_mass(parts)
     usual = read_section(configuration.path(USUAL), ImportRefused)
     drag = [round(mass * one, 3) for one in answers.assumed.numbers("drag_per_mass", 3)]
     air = _told(usual.mapping("air"), ASSUMED)
@@ -220,12 +225,15 @@ def document(
     magnet["holding_force"] = answers.number(
         "magnet.holding_force", magnet["holding_force"].value, "as of the S-500"
     )
+    hand: Tree = {"magnet": magnet}
+    if not parts.magnet:
+        hand = {"end_effector": Told("end_effector", DERIVED, "site of the model")}
     return {
         "model": Told(f"{name}.xml", DERIVED),
         "profiles": {k: Told(v, ASSUMED) for k, v in usual.mapping("profiles").items()},
         "autopilot": Told(usual.text("autopilot"), ASSUMED, "uam vehicle design makes both"),
         "control_period": Told(0.004, ASSUMED, "250 Hz"),
-        "mass": Told(mass, FILE, f"sum of the bodies, and the magnet of {MAGNET_MASS:g} kg"),
+        "mass": Told(mass, FILE, f"sum of the bodies, magnet of {magnet_mass(parts):g} kg"),
         "gravity": Told(GRAVITY, ASSUMED),
         "rotors": rotor_numbers(parts, answers, mass),
         "joints": [
@@ -241,5 +249,4 @@ def document(
         "air": air,
         "sensors": _told(usual.mapping("sensors"), ASSUMED),
         "variation": _told(usual.mapping("variation"), ASSUMED),
-        "magnet": magnet,
-    }
+    } | hand

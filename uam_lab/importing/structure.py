@@ -26,11 +26,13 @@ FREE = mujoco.mjtJoint.mjJNT_FREE
 
 @dataclass
 class Chosen:
-    """Names of parts that the user gives where the file leaves a choice; "" for none."""
+    """Names of parts that the user gives where the file leaves a choice; "" for none. magnet:
+    whether one is hung at the end effector."""
 
     base: str = ""
     arm: str = ""
     end_effector: str = ""
+    magnet: bool = True
 
 
 @dataclass
@@ -48,6 +50,7 @@ class Parts:
     owner: np.ndarray
     rotors: list[FoundRotor]
     tip: str = ""
+    magnet: bool = True
     notes: list[str] = field(default_factory=list)
 
     def bodies(self, link: int) -> np.ndarray:
@@ -79,7 +82,7 @@ def find(source: Source, chosen: Chosen) -> Parts:
     joints = _chain(source, model, base, inside, spinning, chosen.arm)
     owner = _owners(model, base, inside, joints)
     rotors = find_rotors(source, model, data, base, [b for b in inside if owner[b] == 0])
-    parts = Parts(source, model, data, base, joints, owner, rotors)
+    parts = Parts(source, model, data, base, joints, owner, rotors, magnet=chosen.magnet)
     for rotor in rotors:
         if abs(rotor.axis[2]) < LEVEL:
             raise ImportRefused(
