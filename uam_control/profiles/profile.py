@@ -221,6 +221,8 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
     have (same name, meaning, unit and range), and defaults for the others.
     """
     vehicle = vehicle or load_description()
+    if not vehicle.profile(catalogue.DEFAULT):
+        raise ProfileError(f"{vehicle.file}: no profile: uam vehicle design {vehicle.source}")
     if own := own_profile(law, vehicle):
         return load_profile(own, vehicle=vehicle)
     sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)

@@ -3,6 +3,7 @@
 from uam_control.vehicle.chain_reader import chain_of
 from uam_control.vehicle.derived_parameters import derived_parameters
 from uam_control.vehicle.description import (
+    AXES,
     CURRENT_SERVO,
     GRAVITY,
     POSITION_SERVO,
@@ -13,4 +14,11 @@ from uam_control.vehicle.description import (
     Servo,
     VehicleDescription,
 )
-from uam_control.vehicle.loading import DEFAULT_VEHICLE, VehicleError, load_description
+from uam_control.vehicle.loading import (
+    AUTOPILOT_FILE,
+    DEFAULT_VEHICLE,
+    PROFILE_FILE,
+    VehicleError,
+    designed,
+    load_description,
+)

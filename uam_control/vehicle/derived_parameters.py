@@ -8,12 +8,20 @@ from typing import Any
 from uam_control.arm.chain import as_parameters
 from uam_control.vehicle.chain_reader import chain_of
 from uam_control.vehicle.description import AXES, VehicleDescription
+from uam_control.vehicle.loading import VehicleError
 
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
 
 
 def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]:
-    """Return the node parameters derived from the vehicle; a profile can replace them."""
+    """Return the node parameters derived from the vehicle; a profile can replace them.
+
+    Raises VehicleError for a vehicle without gains of its autopilot.
+    """
+    if not vehicle.autopilot_gains:
+        raise VehicleError(
+            f"{vehicle.file}: no gains of the autopilot: uam vehicle design {vehicle.source}"
+        )
     arm = as_parameters(chain_of(vehicle))
     load = arm | {"arm_gravity": vehicle.gravity}
     drag = [round(drag / vehicle.mass, 6) for drag in vehicle.numbers["air"]["drag"]]

@@ -94,10 +94,11 @@ class VehicleDescription:
 
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
-    the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
-    PX4's names. end_effector: site of the MJCF, "" if the file names none, see `chain_reader`.
-    servos: of each joint. numbers: the whole file, including the values that only the plant reads;
-    an entry of `servos` that is not the same for all joints is a list.
+    the file of config/autopilot with the autopilot's gains, "" if the file names none;
+    autopilot_gains: its content or the design's, by PX4's names, {} without either. end_effector:
+    site of the MJCF, "" if the file names none, see `chain_reader`. servos: of each joint. numbers:
+    the whole file, including the values that only the plant reads; an entry of `servos` that is not
+    the same for all joints is a list.
     """
 
     name: str

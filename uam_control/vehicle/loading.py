@@ -24,6 +24,8 @@ DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
 LONGEST_PERIOD = 0.008  # [s] of a tick: the attitude loop oscillates in yaw with 10 ms
 HOVERS = 0.1, 0.8  # share of the full thrust in hover: the range of the autopilot, MPC_THR_HOVER
+# kinds of the files that `uam vehicle design` writes, and the law of its profiles
+PROFILE_FILE, AUTOPILOT_FILE, DESIGNED_LAW = "profile", "autopilot", "modular"
 LEAST_RANGE = 0.2  # [rad] of a joint: the supervisor holds at its ends
 
 
@@ -41,6 +43,11 @@ def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescr
     return describe(read_section(file, VehicleError).values, file)
 
 
+def designed(file: Path, kind: str) -> Path:
+    """Return the file of a design beside the vehicle's `file`; it acts where that names none."""
+    return file.with_name(f"{file.stem}_{kind}.yaml")
+
+
 def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     """Return the checked description in `document`, the content of `file`. Raises VehicleError."""
     top = Section(document, f"{file}:", VehicleError)
@@ -48,7 +55,6 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     if not model.is_file():
         raise VehicleError(f"{file}: model: {model} does not exist")
     rotor, servos = top.section("rotors"), servo_types(top)
-    profiles = top.section("profiles")
     described = VehicleDescription(
         name=file.stem,
         file=file,
@@ -61,11 +67,8 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         servos=tuple(_servo(one) for one in servos),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         end_effector=top.text("end_effector", default=""),
-        profiles={
-            law: configuration.beside(file, "profiles", profiles.text(law))
-            for law in profiles.values
-        },
-        autopilot=top.text("autopilot"),
+        profiles=_profiles(top, file),
+        autopilot=top.text("autopilot", default=""),
         autopilot_gains=_autopilot_gains(top, file),
         numbers=document | {"servos": merged(servos)},
     )
@@ -85,10 +88,27 @@ def _control_period(top: Section) -> float:
     return period
 
 
+def _profiles(top: Section, file: Path) -> dict[str, str]:
+    """Return the profiles by law; where the vehicle has no such entry, that of its design."""
+    if top.has("profiles"):
+        given = top.section("profiles")
+        return {
+            law: configuration.beside(file, "profiles", given.text(law)) for law in given.values
+        }
+    own = designed(file, PROFILE_FILE)
+    return {DESIGNED_LAW: str(own)} if own.is_file() else {}
+
+
 def _autopilot_gains(top: Section, described_in: Path) -> dict[str, float]:
-    """Return the content of the file in config/autopilot; it must not repeat the rotor geometry."""
-    given = configuration.beside(described_in, "autopilot", top.text("autopilot"))
-    file = configuration.named("autopilot", given)
+    """Return the content of the file in config/autopilot, or of the design; {} without either.
+
+    It must not repeat the rotor geometry.
+    """
+    if top.has("autopilot"):
+        given = configuration.beside(described_in, "autopilot", top.text("autopilot"))
+        file = configuration.named("autopilot", given)
+    elif not (file := designed(described_in, AUTOPILOT_FILE)).is_file():
+        return {}
     gains = read_section(file, VehicleError)
     for name in gains.values:
         if str(name).startswith("CA_") or name in ("THR_MDL_FAC", "MPC_THR_HOVER"):

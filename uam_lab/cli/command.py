@@ -24,6 +24,7 @@ from uam_control.settings.parameter_set import (
 )
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.experiments.campaign.variations import VariationError
+from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.study.description import StudyError
 from uam_lab.experiments.trials.trial import TrialFailed
 from uam_lab.experiments.tuning.space import TuningError
@@ -56,6 +57,7 @@ USER_ERRORS = (
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
     *(ArmError, MocapError, ParameterError, LabError, WorkersError, RowTableError),
+    DesignError,
 )
 
 

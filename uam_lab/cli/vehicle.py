@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from uam_control.settings import configuration
-from uam_lab.cli import vehicle_import
+from uam_lab.cli import vehicle_design, vehicle_import
 from uam_lab.cli.command import Command, Subcommands
 from uam_lab.cli.fly import fly
 from uam_lab.flights.conclude import command_line
@@ -30,6 +30,7 @@ examples:
   uam vehicle --config my_lab.yaml --dry-run        all commands computed, none sent, nothing armed
   uam vehicle import drone.urdf              the files of a vehicle of yours: uam vehicle import -h
   uam vehicle --config my_lab.yaml --systemd | sudo tee /etc/systemd/system/uam-vehicle.service
+  uam vehicle design my/quad.yaml            gains and profile of a vehicle of yours
 
 It names each device that is missing and how to check it, waits, and uses a device that is plugged
 in later. Nothing arms by itself: uam start in another shell, or the cockpit's button. Ctrl-C on the
@@ -59,6 +60,7 @@ def add(commands: Subcommands) -> None:
     command.switch("--systemd", "print the unit that starts this at boot, and end")
     below = command.subcommands()
     vehicle_import.add(below)
+    vehicle_design.add(below)
 
 
 def run(options: argparse.Namespace) -> int:

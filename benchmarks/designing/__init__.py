@@ -1,0 +1,1 @@
+"""Vehicles of many sizes for `designed.py` and the tests; see `vehicles`."""

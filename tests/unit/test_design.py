@@ -1,0 +1,171 @@
+"""The design of gains: formulas worked by hand, and vehicles that it must serve."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from designing import vehicles
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control.profiles.profile import ProfileError, default_profile
+from uam_control.vehicle import VehicleError, derived_parameters, load_description
+from uam_lab.cli.main import main
+from uam_lab.experiments.design import search
+from uam_lab.experiments.design.criteria import DesignError, load_criteria
+from uam_lab.experiments.design.facts import Facts, inertias, largest_torque, noise_gains
+from uam_lab.experiments.design.rate_loop import rate_loop
+from uam_lab.experiments.margins.kept import missed
+from uam_sim_bridge.plant import Vehicle
+
+QUAD = vehicles.Made("small", 1.0, 4, 0.16, 0.02, 2)
+QUIET = np.zeros((3, 2, 2))
+
+
+def facts(inertia=0.02, lag=0.1, torque=100.0, noise=QUIET):
+    """Of a vehicle with the torque of a normalised torque 5 N m, dead times 10 ms and 10 ms."""
+    three = np.ones(3)
+    return Facts(
+        inertia * three, three, {}, torque * three, 5.0 * three, lag * three,
+        0.01, 0.01, noise, 0.01, 0.01, three,
+    )  # fmt: skip
+
+
+def test_rate_loop_that_only_its_dead_time_limits():
+    """d = sqrt(1 + (0.5 / 20 ms x 100 ms)^2) = 2.6926; lambda_2 = (1 + d) / (4 x 0.81 x 110 ms)."""
+    found = rate_loop(facts(), 0, load_criteria(), 1.0)
+    d = math.sqrt(1.0 + 2.5**2)
+    assert found.bandwidth == pytest.approx((1.0 + d) / (4.0 * 0.81 * 0.11))
+    assert found.inertia == pytest.approx(0.02 * (1.0 + d))
+    assert found.d == pytest.approx(0.02 * d / 5.0)
+    assert found.stiffness == pytest.approx(5.0 * found.p)  # S K P = Mbar lambda_2
+    assert found.stiffness == pytest.approx(found.inertia * found.bandwidth)
+    assert found.i / found.p == pytest.approx(0.09 * found.bandwidth)
+    assert "100 ms" in found.limit
+
+
+def test_rate_loop_that_torque_limits():
+    """0.45 x 1 N m = stiffness 0.4 lambda_2 0.21 rad; without D: lambda_2^2 = 0.45 / (J 0.084)."""
+    found = rate_loop(facts(inertia=1.0, torque=1.0), 0, load_criteria(), 1.0)
+    assert found.d == 0.0
+    assert found.bandwidth == pytest.approx(math.sqrt(0.45 / 0.084), rel=1e-6)
+    assert "torque" in found.limit
+
+
+@given(st.floats(0.001, 1.0), st.floats(0.01, 0.12), st.floats(0.05, 50.0))
+def test_a_rate_loop_keeps_its_damping_and_its_torque(inertia, lag, torque):
+    criteria = load_criteria()
+    found = rate_loop(facts(inertia, lag, torque), 0, criteria, 1.0)
+    d = 5.0 * found.d / inertia
+    # J T s^2 + J (1 + d) s + S P: damping (1 + d) / (2 sqrt(T S P / J))
+    damping = (1.0 + d) / (2.0 * math.sqrt((lag + 0.01) * found.stiffness / inertia))
+    assert damping >= 0.9 * (1.0 - 1e-9)
+    assert found.stiffness * 0.4 * found.bandwidth * 0.21 <= 0.45 * torque * (1.0 + 1e-9)
+
+
+def test_noise_limits_the_gains():
+    """Variance 1 for D = 1: a command of 1 % allows D = 0.01."""
+    noise = np.zeros((3, 2, 2))
+    noise[:, 1, 1] = 1.0
+    found = rate_loop(facts(inertia=1.0, torque=1e6, noise=noise), 0, load_criteria(), 1.0)
+    assert found.d == pytest.approx(0.01, rel=1e-6)
+    assert "noise" in found.limit
+
+
+def test_noise_without_filters():
+    """P alone passes each sample: variance 1; D is a difference: 2 / dt^2, and -1/dt with P."""
+    found = noise_gains(250.0, [0.0, 0.0, 0.0])
+    expected = [[1.0, 250.0], [250.0, 2.0 * 250.0**2]]
+    assert found[0] == pytest.approx(np.array(expected))
+
+
+def test_torque_in_hover_of_the_s500():
+    """Room 10.344 - 5.396 = 4.949 N of each rotor: 4 x 0.171 m x 4.949 N, and 4 x 0.016 m."""
+    room = 8.549e-6 * 1100.0**2 - 2.2 * 9.81 / 4.0
+    found = largest_torque(load_description())
+    assert found == pytest.approx([4 * 0.171 * room] * 2 + [4 * 0.016 * room])
+
+
+def test_inertia_of_a_vehicle_over_the_poses():
+    """The joint's inertia with all weight at the ends is what a pendulum has; poses are corners."""
+    middle, joints, poses = inertias(Vehicle.load("s500_arm"))
+    assert poses["stowed"] == pytest.approx([0.0, math.pi / 2.0])
+    assert poses["most inertia"] == (0.0, 0.0)  # straight down is farthest from the body
+    assert np.all(middle > [0.0165, 0.0186, 0.0250])  # of the bare body
+    assert np.all(joints > 0.010)  # the servo's own
+
+
+def test_criteria_of_a_file_replace_single_entries(tmp_path):
+    file = tmp_path / "own.yaml"
+    file.write_text("margins: {delay: 0.08}\n")
+    found = load_criteria(file)
+    assert found.margins.delay == 0.08
+    assert found.margins.gain == load_criteria().margins.gain
+    file.write_text("margins: {delays: 0.08}\n")
+    with pytest.raises(DesignError, match="delays"):
+        load_criteria(file)
+    file.write_text("margins: {delay: -1}\n")
+    with pytest.raises(DesignError, match="not above 0"):
+        load_criteria(file)
+
+
+@pytest.fixture(scope="module")
+def designed(tmp_path_factory):
+    """A vehicle without gains whose design stands beside it."""
+    file = vehicles.write(QUAD, tmp_path_factory.mktemp("vehicle"))
+    bare = load_description(file)
+    assert main(["vehicle", "design", str(file)]) == 0
+    return file, bare
+
+
+def test_a_vehicle_without_gains_names_the_command(designed):
+    _, bare = designed
+    with pytest.raises(ProfileError, match="uam vehicle design"):
+        default_profile("modular", bare)
+    with pytest.raises(VehicleError, match="uam vehicle design"):
+        derived_parameters(bare)
+
+
+def test_a_design_acts_beside_its_vehicle_and_keeps_its_margins(designed):
+    described = load_description(designed[0])
+    profile = default_profile("modular", described)
+    assert missed(profile, [0.0, 0.05]) == ()
+    attitude, gains = profile.sets["attitude_controller"], described.autopilot_gains
+    assert gains["MC_ROLLRATE_K"] * gains["MC_ROLLRATE_P"] > 0.0
+    # Mbar lambda_2 = S K P: the measured body rates cancel
+    scale = Facts.of(Vehicle.of(described)).scale[0]
+    stiffness = scale * gains["MC_ROLLRATE_K"] * gains["MC_ROLLRATE_P"]
+    assert attitude.inertia[0] * attitude.lambda_2[0] == pytest.approx(stiffness, rel=2e-3)
+    assert (designed[0].parent / "small_bode.png").stat().st_size > 10_000
+
+
+def test_a_profile_of_another_vehicle_is_named_with_numbers(designed):
+    """The S-500's profile on a vehicle of 1 kg and a sixth of its inertia."""
+    described = replace(load_description(designed[0]), profiles={"modular": "s500"})
+    (line,) = missed(default_profile("modular", described), [0.0])
+    assert "s500 on small" in line
+    assert "rad/s" in line or " ms" in line
+
+
+def test_the_same_numbers_give_the_same_design(designed, tmp_path):
+    assert main(["vehicle", "design", str(designed[0]), "--out", str(tmp_path)]) == 0
+    for name in ("small_profile.yaml", "small_autopilot.yaml"):
+        assert (tmp_path / name).read_text() == (designed[0].parent / name).read_text()
+
+
+def test_files_of_a_person_are_not_replaced(designed, tmp_path, capsys):
+    own = tmp_path / "small_profile.yaml"
+    own.write_text(yaml.safe_dump({"mission": {"ros__parameters": {}}}))
+    assert main(["vehicle", "design", str(designed[0]), "--out", str(tmp_path)]) == 2
+    assert "small_profile.yaml is not a design's" in capsys.readouterr().err
+
+
+def test_margins_that_no_gains_keep_are_refused(designed, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(search, "ROUNDS", 2)
+    criteria = tmp_path / "criteria.yaml"
+    criteria.write_text("margins: {peak: 1.0001}\n")
+    asked = ["vehicle", "design", str(designed[0]), "--criteria", str(criteria)]
+    assert main([*asked, "--out", str(tmp_path)]) == 2
+    assert "no gains" in capsys.readouterr().err

@@ -1,0 +1,68 @@
+"""`uam vehicle design`: gains of the autopilot and a profile from a vehicle's numbers."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from uam_control.settings import configuration
+from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, load_description
+from uam_lab.cli.command import Command, Subcommands
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
+
+DONE = 0
+EXAMPLES = """\
+examples:
+  uam vehicle design my/quad.yaml            profile, autopilot and pictures beside my/quad.yaml
+  uam vehicle design hexa_arm --out mine     in the folder mine
+  uam vehicle design my/quad.yaml --criteria my/margins.yaml      other margins, see docs/tuning.md
+
+A vehicle whose file names neither profiles nor autopilot flies with the design beside it:
+uam fly --vehicle my/quad.yaml. The margins are those of uam margins. Exit status: 0 designed,
+2 wrong use, or no gains keep the margins.
+"""
+
+
+def add(commands: Subcommands) -> None:
+    """Add the subcommand to those of `uam vehicle`."""
+    command = Command(
+        commands,
+        "design",
+        run,
+        "gains of the autopilot and a profile from the vehicle's numbers",
+        "Design the gains of the autopilot and the flying profile of a vehicle from its file, with "
+        "stated margins, and say what limits each loop.",
+        EXAMPLES,
+    )
+    vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
+    command.option("name", "NAME|FILE", f"{vehicles}, or the description of a vehicle")
+    text = "entries in place of those of config/design/criteria.yaml"
+    command.option("--criteria", "FILE", text, type=Path)
+    text = "folder of the files (default: that of the vehicle's file; a folder of results for NAME)"
+    command.option("--out", "DIR", text, type=Path)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Design, write and print; return the exit status."""
+    from uam_lab.experiments.design import files, search, table
+    from uam_lab.experiments.design.criteria import load_criteria
+
+    described = load_description(options.name)
+    criteria = load_criteria(options.criteria)
+    folder, shipped = options.out, described.source == described.name
+    if folder is not None or shipped:
+        folder = make_folder(folder, "design")
+    written = files.files_of(described, folder or described.file.parent)
+    made = search.design(described, criteria, say)
+    files.write(made, written)
+    say(table.text(made))
+    for file in written.values():
+        say(f"written  {file}")
+    numbers = described.numbers
+    if folder is not None or "profiles" in numbers or "autopilot" in numbers:
+        say(
+            f"{described.file.name} flies with these gains after: profiles: {{modular: "
+            f"{written[PROFILE_FILE]}}}, autopilot: {written[AUTOPILOT_FILE]}"
+        )
+    return DONE

@@ -1,0 +1,1 @@
+"""Design of a vehicle's gains from its numbers, held against the margins model; see `search`."""

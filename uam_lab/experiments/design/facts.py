@@ -1,0 +1,141 @@
+"""What a design begins with: inertias over the poses of the arm, torques, lags and noise."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.setpoints.rotor_geometry import YAW, effectiveness, torque_scale
+from uam_control.vehicle import VehicleDescription
+from uam_lab.analysis.dynamics import Body
+from uam_sim_bridge.autopilot.loops.rate_control import (
+    LIMIT,
+    TORQUE,
+    D,
+    P,
+    filter_coefficients,
+    filter_gyro,
+    rate_torque,
+)
+from uam_sim_bridge.autopilot.params import DEFINITIONS
+from uam_sim_bridge.plant import Vehicle
+
+UNANSWERED = 1.5  # periods: a sample is half a period old on the average, and acts for one
+IMPULSE = 400  # samples of the filters' response to one sample of noise
+FILTERS = ("IMU_GYRO_CUTOFF", "IMU_DGYRO_CUTOFF", "MC_YAW_TQ_CUTOFF")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Numbers of a vehicle.
+
+    inertia (3,): about roll, pitch, yaw with the arm locked, the middle over the poses [kg m^2];
+    joints (n,): of each joint, the same [kg m^2]; poses: joint angles (n,) [rad] by their names;
+    torque (3,): largest in hover [N m]; scale (3,): of a normalised torque of 1 [N m]; lag (3,):
+    of rotors and filters of the torque [s]; dead: dead time of the rate loop [s]; slope: that of
+    its path of D in addition [s]; noise (3, 2, 2): P, D → variance of the command; seen: age of a
+    state at the law [s]; bus: age of a joint's sample when its torque acts [s]; servo
+    (n,): torque at which the supervisor holds [N m].
+    """
+
+    inertia: np.ndarray
+    joints: np.ndarray
+    poses: dict[str, tuple[float, ...]]
+    torque: np.ndarray
+    scale: np.ndarray
+    lag: np.ndarray
+    dead: float
+    slope: float
+    noise: np.ndarray
+    seen: float
+    bus: float
+    servo: np.ndarray
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> Facts:
+        """Return the facts of a vehicle; raises VehicleError if its MJCF contradicts it."""
+        described, period = vehicle.description, vehicle.description.control_period
+        sensors, servos = vehicle.numbers["sensors"], vehicle.numbers["servos"]
+        inertia, joints, poses = inertias(vehicle)
+        cutoffs = [
+            described.autopilot_gains.get(name, DEFINITIONS[name].default) for name in FILTERS
+        ]
+        gyro, slope, yaw = (1.0 / (2.0 * math.pi * one) if one > 0.0 else 0.0 for one in cutoffs)
+        imu, bus = sensors["imu"], sensors["joints"]["latency_ticks"]
+        return cls(
+            inertia=inertia,
+            joints=joints,
+            poses=poses,
+            torque=largest_torque(described),
+            scale=torque_scale(*described.geometry(), described.rotor_thrust),
+            lag=described.rotor.lag + np.array([0.0, 0.0, yaw]),
+            dead=math.sqrt(2.0) * gyro + UNANSWERED * period,
+            slope=slope,
+            noise=imu["gyro_noise"] ** 2 * noise_gains(1.0 / period, cutoffs),
+            seen=(imu["latency_ticks"] + UNANSWERED) * period,
+            bus=(bus + servos["command_latency_ticks"] + UNANSWERED) * period,
+            servo=np.array([one.effort_limit for one in described.servos]),
+        )
+
+
+def inertias(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, dict[str, tuple[float, ...]]]:
+    """Return `Facts.inertia`, `Facts.joints`, `Facts.poses` over the corners of the arm's range."""
+    described, body = vehicle.description, Body(vehicle)
+    ranges = ({j.low, min(max(0.0, j.low), j.high), j.high, j.stowed} for j in described.joints)
+    corners = sorted(itertools.product(*ranges))
+    rows = np.array([inertia_at(body, one) for one in corners])
+    middle = 0.5 * (rows.min(axis=0) + rows.max(axis=0))
+    size = rows[:, : ATTITUDE.stop - ATTITUDE.start].sum(axis=1)
+    poses = {
+        "stowed": described.stowed,
+        "least inertia": corners[int(np.argmin(size))],
+        "most inertia": corners[int(np.argmax(size))],
+    }
+    return middle[:3], middle[3:], poses
+
+
+def inertia_at(body: Body, arm: tuple[float, ...]) -> np.ndarray:
+    """Return the inertia about roll, pitch, yaw of the locked vehicle about its centre of mass, and
+    that of each joint with the base held (3 + n,) [kg m^2]; arm (n,) [rad]."""
+    chi = np.zeros(body.size)
+    chi[ARM] = arm
+    mass = np.zeros((body.size, body.size))
+    body.evaluate(chi, 0.0 * chi, np.array([-sum(arm), 0.0, 0.0]), mass, *np.zeros((3, body.size)))
+    across = mass[ATTITUDE, POSITION] @ np.linalg.solve(
+        mass[POSITION, POSITION], mass[POSITION, ATTITUDE]
+    )
+    return np.concatenate([np.diag(mass[ATTITUDE, ATTITUDE] - across), np.diag(mass)[ARM]])
+
+
+def largest_torque(described: VehicleDescription) -> np.ndarray:
+    """Return the torque (3,) [N m] about each axis at which, in hover, the first rotor is at 0 or
+    at its full thrust."""
+    by_torque = np.linalg.pinv(effectiveness(*described.geometry()))[:, : YAW + 1]
+    hover = described.mass * described.gravity / len(described.rotors)
+    room = min(hover, described.rotor.thrust_max - hover)
+    return room / np.abs(by_torque).max(axis=0)
+
+
+def noise_gains(rate: float, cutoffs: list[float]) -> np.ndarray:
+    """Return (3, 2, 2): with g = (P, D) of an axis, g^T N g is the variance of its normalised
+    torque for gyroscope noise of variance 1 at `rate` [Hz]; cutoffs [Hz]: of FILTERS."""
+    filters, still = filter_coefficients(rate, *cutoffs), np.zeros(3)
+    answers = np.zeros((2, IMPULSE, 3))
+    for which, row in enumerate((P, D)):
+        memory, gains = np.zeros((7, 3)), np.zeros((LIMIT + 1, 3))
+        gains[row] = 1.0
+        for k in range(IMPULSE):
+            filter_gyro(np.full(3, float(k == 0)), 1.0 / rate, filters, memory)
+            rate_torque(still, 1.0 / rate, filters, gains, True, memory)
+            answers[which, k] = memory[TORQUE]
+    return np.einsum("aki,bki->iab", answers, answers)
+
+
+def payload(described: VehicleDescription, criteria: SimpleNamespace) -> float:
+    """Return the payload [kg] with which the margins are kept."""
+    return criteria.payload * described.mass

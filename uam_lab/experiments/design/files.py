@@ -1,0 +1,59 @@
+"""The files of a design: profile and gains of the autopilot, and the pictures of its margins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, VehicleDescription, designed
+from uam_lab.experiments.design.criteria import DesignError
+from uam_lab.experiments.design.search import Design
+from uam_lab.experiments.margins import report
+from uam_lab.records.results.atomic import write_text
+from uam_lab.report.figures import style
+
+MADE = "# uam vehicle design"  # first words of a file that a later design may replace
+PICTURES = (("bode", report.bode), ("step", report.steps))
+
+
+def files_of(described: VehicleDescription, folder: Path) -> dict[str, Path]:
+    """Return profile, autopilot and pictures of a vehicle's design in `folder`, by kind.
+
+    Raises DesignError for one that is there and was written by hand.
+    """
+    found = {
+        kind: folder / designed(described.file, kind).name
+        for kind in (PROFILE_FILE, AUTOPILOT_FILE)
+    }
+    for file in found.values():
+        if file.exists() and not file.read_text(encoding="utf-8").startswith(MADE):
+            raise DesignError(f"{file} is not a design's: --out writes to another folder")
+    return found | {
+        name: folder / f"{described.file.stem}_{name}.png" for name, _ in PICTURES
+    }
+
+
+def write(made: Design, files: Mapping[str, Path]) -> None:
+    """Write the files of `files_of`."""
+    head = f"{MADE} {made.described.file.name}\n"
+    limits = "".join(f"# {loop}: {why}\n" for loop, why in made.limits.items())
+    nodes = {node: {"ros__parameters": values} for node, values in made.profile.sections.items()}
+    lines = head + "# what keeps each loop from being faster:\n" + limits
+    write_text(files[PROFILE_FILE], lines + "".join(_block(nodes, "")))
+    write_text(files[AUTOPILOT_FILE], head + "".join(_block(made.described.autopilot_gains, "")))
+    with style.styled():
+        for name, draw in PICTURES:
+            style.save(draw(made.cases), files[name])
+
+
+def _block(values: Mapping[str, Any], indent: str) -> list[str]:
+    """Return the lines of a mapping in YAML, lists in one line."""
+    lines = []
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{name}:\n", *_block(value, f"{indent}  ")]
+        else:
+            text = str(value).lower() if isinstance(value, bool) else value
+            lines.append(f"{indent}{name}: {text}\n")
+    return lines

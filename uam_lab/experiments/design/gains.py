@@ -1,0 +1,188 @@
+"""Bandwidths of the loops → parameters of the autopilot and sections of a profile."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from uam_control.control.output_limits import RateLimits
+from uam_control.coordinates import ROLL, YAW
+from uam_control.settings import configuration
+from uam_control.settings.parameter_file import read_sections
+from uam_control.settings.section import read_section
+from uam_control.vehicle import AXES, VehicleDescription
+from uam_lab.experiments.design.criteria import DesignError
+from uam_lab.experiments.design.facts import Facts
+from uam_lab.experiments.design.rate_loop import RateLoop
+from uam_sim_bridge.autopilot.params import DEFINITIONS
+
+DIGITS = 4
+# MC_*RATE_K scales the gains of an axis to at most these: PX4's ranges of roll
+MOST_P, MOST_D = 0.5, 0.01
+TIPPED = 0.2, 0.4  # [rad] beyond tilt_max at which the supervisor holds, and gives up
+MISSED = 0.5, 1.0  # [s] of missed ticks at which it does
+LEAST_THRUST = 0.05  # share of the weight
+
+
+@dataclass(frozen=True)
+class Bandwidths:
+    """rates: the autopilot's loops about roll, pitch, yaw; attitude (3,): lambda_1 / lambda_2;
+    position (3,), arm (n,): lambda_2; all in [rad/s]."""
+
+    rates: tuple[RateLoop, ...]
+    attitude: np.ndarray
+    position: np.ndarray
+    arm: np.ndarray
+
+
+def autopilot_gains(found: Bandwidths) -> dict[str, float]:
+    """Return the autopilot's parameters, by PX4's names."""
+    values: dict[str, float] = {}
+    for name, loop, attitude in zip(AXES, found.rates, found.attitude, strict=True):
+        scale = max(1.0, loop.p / MOST_P, loop.d / MOST_D if name != AXES[-1] else 0.0)
+        scale = min(scale, DEFINITIONS[f"MC_{name}RATE_K"].high)
+        for letter, gain in zip("PID", (loop.p, loop.i, loop.d), strict=True):
+            values[f"MC_{name}RATE_{letter}"] = rounded(gain / scale)
+        values[f"MC_{name}RATE_K"] = rounded(scale)
+        usual = DEFINITIONS[f"MC_{name}_P"].default
+        values[f"MC_{name}_P"] = rounded(min(usual, attitude))
+    fixed = read_section(configuration.path("design/autopilot.yaml"), DesignError)
+    return values | fixed.values
+
+
+def sections(
+    described: VehicleDescription, facts: Facts, found: Bandwidths, criteria: SimpleNamespace
+) -> dict[str, dict[str, Any]]:
+    """Return the sections of the profile by node, without `delay_margin`."""
+    fixed = read_sections(configuration.path("design/profile.yaml"))
+    position, tilt = _position(described, found, criteria, fixed["position_controller"])
+    own = {
+        "position_controller": position,
+        "attitude_controller": _attitude(facts, found, criteria, fixed["attitude_controller"]),
+        "arm_controller": _arm(facts, found, criteria, fixed["arm_controller"]),
+        "state_estimator": estimator(described, criteria),
+        "mission": _mission(described, found, tilt),
+        "mavlink_bridge": _bridge(described, facts, criteria),
+    }
+    return {node: fixed.get(node, {}) | values for node, values in own.items()}
+
+
+def _position(
+    described: VehicleDescription, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
+) -> tuple[dict[str, Any], float]:
+    """Return the section of the position controller, and its tilt_max [rad]."""
+    thrust = criteria.authority.thrust * described.full_thrust
+    weight = described.mass * described.gravity
+    tilt = math.acos(min(1.0, criteria.authority.weight * weight / thrust))
+    tilt = rounded(min(criteria.authority.tilt, max(tilt, 0.1)))
+    corner = criteria.attitude_filter * float(np.mean(found.attitude[: YAW - ROLL]))
+    values = _feedback(found.position, criteria, criteria.adaptation.position, fixed)
+    return values | {
+        "inertia": [described.mass] * len(found.position),
+        "integral_gain": listed(criteria.feedback.integral * found.position**3),
+        "thrust_min": rounded(LEAST_THRUST * weight),
+        "thrust_max": rounded(thrust),
+        "tilt_max": tilt,
+        "attitude_cutoff": rounded(corner / (2.0 * math.pi)),
+    }, tilt
+
+
+def _attitude(
+    facts: Facts, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
+) -> dict[str, Any]:
+    second = np.array([loop.bandwidth for loop in found.rates])
+    share = criteria.adaptation.attitude
+    return _law(second * found.attitude, second, criteria, share, fixed) | {
+        "inertia": listed(np.array([loop.inertia for loop in found.rates])),
+        "torque_max": listed(np.array(criteria.authority.torque) * facts.torque),
+        "arm_feedforward": True,
+    }
+
+
+def _arm(
+    facts: Facts, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
+) -> dict[str, Any]:
+    torque = criteria.authority.servo * facts.servo
+    # the integral's limit is one number for all joints: what none of them exceeds
+    most = 0.5 * float(np.min(torque / facts.joints))
+    return _feedback(found.arm, criteria, criteria.adaptation.arm, fixed) | {
+        "inertia": listed(facts.joints),
+        "lambda_table": [1.0] * len(found.arm),
+        "integral_gain": listed(criteria.feedback.integral * found.arm**3),
+        "integral_limit": rounded(most),
+        "torque_max": listed(torque),
+        "arm_feedforward": True,
+    }
+
+
+def estimator(described: VehicleDescription, criteria: SimpleNamespace) -> dict[str, float]:
+    """Return the estimator's bandwidths for the rate and the age of the vehicle's poses."""
+    mocap, c = described.numbers["sensors"]["mocap"], criteria.estimator
+    age = mocap["latency_ticks"] * described.control_period + 1e-9
+    most = min(c.interval * mocap["rate"], c.age / age)
+    return {
+        "position_bandwidth": rounded(min(c.position, most)),
+        "attitude_bandwidth": rounded(min(c.attitude, most)),
+    }
+
+
+def _mission(described: VehicleDescription, found: Bandwidths, tilt: float) -> dict[str, Any]:
+    (hold, failsafe), period = TIPPED, described.control_period
+    slowest = min(loop.bandwidth for loop in found.rates[: YAW - ROLL])
+    return {
+        "tilt_hold": rounded(tilt + hold),
+        "tilt_failsafe": rounded(tilt + failsafe),
+        "rate_lag": rounded(1.0 / slowest),
+        "missed_ticks_hold": float(round(MISSED[0] / period)),
+        "missed_ticks_failsafe": float(round(MISSED[1] / period)),
+    }
+
+
+def _bridge(
+    described: VehicleDescription, facts: Facts, criteria: SimpleNamespace
+) -> dict[str, Any]:
+    torque = np.array(criteria.authority.torque) * facts.torque
+    reached = criteria.authority.spin_up * torque / facts.inertia
+    most = 0.5 * (criteria.authority.thrust + 1.0) * described.full_thrust
+    return {
+        "thrust_min": rounded(LEAST_THRUST * described.mass * described.gravity),
+        "thrust_max": rounded(most),
+        "rate_limit": listed(np.minimum(RateLimits().rate_limit, reached)),
+    }
+
+
+def _feedback(
+    second: np.ndarray, criteria: SimpleNamespace, share: float, fixed: dict
+) -> dict[str, Any]:
+    return _law(criteria.feedback.stiffness * second**2, second, criteria, share, fixed)
+
+
+def _law(
+    first: np.ndarray, second: np.ndarray, criteria: SimpleNamespace, share: float, fixed: dict
+) -> dict[str, Any]:
+    """Return lambda_1, lambda_2 and Q of a law; share: of lambda_1 that adaptation adds at most.
+
+    At its ceiling K0 adds K0 p12 / varpi to lambda_1; p12 = q_position / (2 lambda_1).
+    """
+    q_position = 2.0 * share * first**2 * fixed["varpi"] / fixed["k_ceiling"][0]
+    return {
+        "lambda_1": listed(first),
+        "lambda_2": listed(second),
+        "q_position": listed(q_position),
+        "q_velocity": listed(criteria.adaptation.rate * q_position / first),
+    }
+
+
+def rounded(value: float) -> float:
+    """Return `value` to DIGITS digits."""
+    return float(f"{value:.{DIGITS}g}")
+
+
+def listed(values: Sequence[float] | np.ndarray) -> list[float]:
+    """Return `values` as a list of rounded numbers."""
+    return [rounded(float(value)) for value in values]

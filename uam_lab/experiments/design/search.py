@@ -1,0 +1,218 @@
+"""Design of autopilot gains and profile: closed formulas, then the margins of the linear model.
+
+Each loop has one bandwidth. It begins at what lags, noise and torques allow, and is made smaller
+by STEP until `uam margins`' model has the margins of the criteria at every pose of the arm and with
+the payload. All loops are judged together, because each closes around the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import PITCH, ROLL, YAW, Z
+from uam_control.estimation import EstimatorParameters
+from uam_control.profiles.profile import Profile, profile_of
+from uam_control.vehicle import VehicleDescription
+from uam_lab.experiments.design.criteria import DesignError
+from uam_lab.experiments.design.facts import Facts, payload
+from uam_lab.experiments.design.gains import (
+    Bandwidths,
+    autopilot_gains,
+    estimator,
+    sections,
+)
+from uam_lab.experiments.design.rate_loop import rate_loop
+from uam_lab.experiments.margins.loops import GROWTH, Analysis, analyse, fastest_mode
+from uam_lab.experiments.margins.margins import Margins
+from uam_lab.experiments.margins.report import Case
+from uam_lab.experiments.margins.stack_model import Stack, stack_model
+from uam_sim_bridge.plant import Vehicle
+
+STEP, ROUNDS = 0.92, 40
+RATES, SETPOINTS = "rate loop", "setpoints"
+ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
+
+
+@dataclass(frozen=True)
+class Design:
+    """A designed vehicle.
+
+    described: with the designed gains of the autopilot; sections: of the profile, by node;
+    limits: loop → what keeps it from being faster; cases: the analysed operating points.
+    """
+
+    described: VehicleDescription
+    profile: Profile
+    limits: dict[str, str]
+    cases: tuple[Case, ...]
+
+
+def design(
+    described: VehicleDescription,
+    criteria: SimpleNamespace,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Design:
+    """Return the design of a vehicle; progress: called with a line per round.
+
+    Raises DesignError, and VehicleError if the MJCF contradicts the description.
+    """
+    search = Search(described, criteria)
+    for number in range(1, ROUNDS + 1):
+        found = search.evaluated()
+        progress(f"round {number}: {found.summary}")
+        if not found.slower:
+            return search.result(found)
+        search.slow_down(found.slower)
+    raise DesignError(f"{described.name}: no gains within {ROUNDS} rounds: {found.summary}")
+
+
+@dataclass(frozen=True)
+class Found:
+    """An evaluation: profile, vehicle, cases, and per loop that must be slower the reason."""
+
+    described: VehicleDescription
+    profile: Profile
+    cases: tuple[Case, ...]
+    slower: dict[str, str]
+
+    @property
+    def summary(self) -> str:
+        """Return the loops that must be slower, in one line."""
+        return "; ".join(f"{loop}: {why}" for loop, why in self.slower.items()) or "margins are met"
+
+
+class Search:
+    """The bandwidths of a vehicle, and what limits them."""
+
+    def __init__(self, described: VehicleDescription, criteria: SimpleNamespace) -> None:
+        # gains of the autopilot follow: those of the file are not used
+        self._described = replace(described, autopilot_gains={})
+        self._criteria = criteria
+        self.facts = Facts.of(Vehicle.of(self._described))
+        names = described.coordinates
+        self._shares = dict.fromkeys((RATES, *names), 1.0)
+        self._limits: dict[str, str] = {}
+
+    def bandwidths(self) -> Bandwidths:
+        """Return the bandwidths: what the formulas allow, times the share of each loop."""
+        c, facts, described = self._criteria, self.facts, self._described
+        names = described.coordinates
+        rates = tuple(rate_loop(facts, i, c, self._shares[RATES]) for i in range(YAW - ROLL + 1))
+        share = np.array([self._shares[name] for name in names])
+        attitude = c.attitude * np.array([one.bandwidth for one in rates]) * share[ROLL : YAW + 1]
+        for name, loop in zip(names[ROLL:], rates, strict=False):
+            self._limits.setdefault(name, loop.limit)
+        position, arm = self._position(attitude), self._arm()
+        return Bandwidths(rates, attitude, position * share[:ROLL], arm * share[YAW + 1 :])
+
+    def _position(self, attitude: np.ndarray) -> np.ndarray:
+        c, facts, described = self._criteria, self.facts, self._described
+        names = described.coordinates
+        seen = c.estimate * estimator(described, c)["position_bandwidth"]
+        across = c.horizontal * float(attitude[: YAW - ROLL].min())
+        room = c.authority.thrust * described.full_thrust / described.mass - described.gravity
+        vertical = {
+            "rotor lag": c.vertical / (facts.lag[0] + facts.seen),
+            "estimator": seen,
+            "thrust": math.sqrt(max(room, 0.1) / (c.saturation.height * c.feedback.stiffness)),
+        }
+        slowest = min(vertical, key=vertical.__getitem__)
+        self._limits.setdefault(names[Z], slowest)
+        for name in names[:Z]:
+            self._limits.setdefault(name, "attitude" if across < seen else "estimator")
+        return np.array([min(across, seen), min(across, seen), vertical[slowest]])
+
+    def _arm(self) -> np.ndarray:
+        c, facts, described = self._criteria, self.facts, self._described
+        age = facts.bus + 1.0 / EstimatorParameters().joint_velocity_weight
+        late = c.joint / age
+        torques = c.authority.servo * facts.servo
+        strong = np.sqrt(torques / (c.feedback.stiffness * c.saturation.joint * facts.joints))
+        for name, one, torque in zip(described.joint_names, strong, torques, strict=True):
+            text = f"samples and commands {1e3 * age:.0f} ms late"
+            self._limits.setdefault(name, text if late < one else f"torque {torque:.2g} N m")
+        return np.minimum(late, strong)
+
+    def evaluated(self) -> Found:
+        """Return the margins with the present bandwidths."""
+        bandwidths = self.bandwidths()
+        described = replace(self._described, autopilot_gains=autopilot_gains(bandwidths))
+        own = sections(described, self.facts, bandwidths, self._criteria)
+        profile = profile_of(own, Path(f"{described.name}_profile.yaml"), described)
+        cases, slower = [], {}
+        for label, arm, mass in self._points():
+            stack = stack_model(profile, Vehicle.of(described), mass, arm)
+            analysis = analyse(stack)
+            cases.append(Case(label, stack, analysis, {}, fastest_mode(stack)))
+            for loop, why in self._failing(stack, analysis).items():
+                slower.setdefault(loop, f"{why}, {label}")
+        return Found(described, profile, tuple(cases), slower)
+
+    def _points(self) -> list[tuple[str, tuple[float, ...], float]]:
+        """Return label, joint angles and payload [kg] of each operating point."""
+        poses, mass = self.facts.poses, payload(self._described, self._criteria)
+        loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
+        return [*((name, arm, 0.0) for name, arm in poses.items()), loaded]
+
+    def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, str]:
+        """Return each loop that must be slower, with the reason."""
+        wanted, found = self._criteria.margins, {}
+        for loop, (_, margins) in analysis.loops.items():
+            if why := shortfall(margins, wanted):
+                found[loop] = why
+        if analysis.setpoint_delay < wanted.delay:
+            base = [name for name in analysis.loops if name in stack.coordinates[: YAW + 1]]
+            worst = min(base, key=lambda name: analysis.loops[name][1].delay)
+            found.setdefault(worst, f"delay margin {1e3 * analysis.setpoint_delay:.0f} ms")
+        factor = 10.0 ** (wanted.gain / 20.0)
+        if not found and analysis.stable:
+            for name, one in (("up", factor), ("down", 1.0 / factor)):
+                if fastest_mode(scaled_motors(stack, one)).growth >= GROWTH:
+                    found[RATES] = f"gain margin of all motors {name}"
+        if not analysis.stable and not found:
+            found = dict.fromkeys(self._shares, "unstable")
+        return found
+
+    def slow_down(self, loops: dict[str, str]) -> None:
+        """Make these loops slower by STEP; roll and pitch, and x and y, stay alike."""
+        names = self._described.coordinates
+        pairs = (names[ROLL], names[PITCH]), names[:Z]
+        for loop in {*loops, *(o for pair in pairs if {*pair} & {*loops} for o in pair)}:
+            self._shares[loop] *= STEP
+        for loop, why in loops.items():
+            self._limits[loop] = why
+
+    def result(self, found: Found) -> Design:
+        """Return the design; its profile has the delay margin of the cases."""
+        least = min(case.analysis.setpoint_delay for case in found.cases)
+        own = {node: dict(values) for node, values in found.profile.sections.items()}
+        own["mission"]["delay_margin"] = min(1.0, math.floor(ROUND_DOWN * least) / ROUND_DOWN)
+        profile = profile_of(own, found.profile.file, found.described)
+        return Design(found.described, profile, dict(self._limits), found.cases)
+
+
+def shortfall(margins: Margins, wanted: SimpleNamespace) -> str:
+    """Return the margin of a loop that is below the wanted one, "" if all are met."""
+    if margins.delay < wanted.delay:
+        return f"delay margin {1e3 * margins.delay:.0f} ms"
+    least = min(margins.gain, margins.gain_down)
+    if least < wanted.gain:
+        return f"gain margin {least:.1f} dB"
+    return f"sensitivity {margins.peak:.2f}" if margins.peak > wanted.peak else ""
+
+
+def scaled_motors(stack: Stack, factor: float) -> Stack:
+    """Return the stack whose motors are commanded `factor` times the change."""
+    blocks: list[Any] = []
+    for block in stack.blocks:
+        if block.outputs[0].startswith("motor."):
+            block = replace(block, c=factor * block.c, d=factor * block.d)
+        blocks.append(block)
+    return replace(stack, blocks=tuple(blocks))
