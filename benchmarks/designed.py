@@ -3,9 +3,9 @@
     .venv/bin/python benchmarks/designed.py                    # direct engine, seed 1
     .venv/bin/python benchmarks/designed.py octo_8000 quad_3750 --seeds 1 2 3
 
-Each vehicle is written without gains (designing/vehicles.py), designed as by uam vehicle design, and
-flies a hover, a circle at 1 m/s and motions of each joint. Exit status 1: a flight is not completed, or
-its position is beyond 10 mm RMS.
+Each vehicle is written without gains (designing/vehicles.py), designed as by uam vehicle design,
+and flies a hover, a circle at 1 m/s and motions of each joint. Exit status 1: a flight is not
+completed, or its position is beyond 10 mm RMS.
 """
 
 from __future__ import annotations

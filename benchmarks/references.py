@@ -2,6 +2,7 @@
 
     python benchmarks/references.py                           # direct engine, seed 1
     python benchmarks/references.py --seeds 1 2 --engine ros lemniscate race_5
+    python benchmarks/references.py --vehicle my/s500.yaml    # with its own profile
 
 Per reference: 3-D RMSE and largest distance of the position in the phase `trajectory`, largest tilt
 and thrust there, and the end of the flight. A reference that the vehicle cannot fly is slowed down
@@ -15,6 +16,7 @@ import tempfile
 from pathlib import Path
 
 from uam_control.mission import ScenarioError
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.flights.library.errors import FlightError
 from uam_lab.flights.library.flight import Flight
 
@@ -27,15 +29,17 @@ OPENED = "race_10"  # references whose name begins so need the limits of this pr
 HEADINGS = ("reference", "3-D RMSE [mm]", "largest [mm]", "tilt [°]", "thrust [N]", "end")
 
 
-def row(name: str, seed: int, engine: str, profiles: list[str]) -> tuple[str, ...]:
+def row(name: str, seed: int, options: argparse.Namespace) -> tuple[str, ...]:
     """Fly one reference; return its row."""
+    profiles = options.profile or [load_description(options.vehicle).profile("modular")]
     profiles = [*profiles, OPENED] if name.startswith(OPENED) else profiles
     with tempfile.TemporaryDirectory() as folder:
         try:
             flight = Flight(
                 scenario=name,
                 seed=seed,
-                engine=engine,
+                engine=options.engine,
+                vehicle=options.vehicle,
                 profile=profiles,
                 retime=True,
                 out=Path(folder) / "flight",
@@ -69,12 +73,13 @@ def main() -> None:
     parser.add_argument("references", nargs="*", default=REFERENCES)
     parser.add_argument("--seeds", nargs="+", type=int, default=[1])
     parser.add_argument("--engine", choices=("direct", "ros"), default="direct")
-    parser.add_argument("--profile", nargs="+", default=["s500"])
+    parser.add_argument("--vehicle", default=DEFAULT_VEHICLE)
+    parser.add_argument("--profile", nargs="+", help="default: the vehicle's")
     options = parser.parse_args()
     print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")
     for name in options.references:
         for seed in options.seeds:
-            shown = row(name, seed, options.engine, options.profile)
+            shown = row(name, seed, options)
             print(f"| {' | '.join(shown)} |", flush=True)
 
 

@@ -23,7 +23,6 @@ SHOULDER, SHORT, FOOT = 0.3, 0.03, 0.012  # of the radius to joint 1, magnet bel
 STRONG = 4.0  # stall torque, parts of the torque that holds the arm level
 THRUST_TO_WEIGHT = 2.0
 SCENARIO_NAMES = ("hover", "circle", "arm motions")
-PICTURED = "carbon"
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def scenarios(made: Made, folder: Path) -> dict[str, Path]:
         "moves": ground,
         "landing": {"at": 9, "duration": 6},
     }
-    circle = {"trajectory": {"kind": "circle", "radius": 1.0, "speed": 1.0, "laps": 2, "height": 1.2}}
+    circle = {"kind": "circle", "radius": 1.0, "speed": 1.0, "laps": 2, "height": 1.2}
     moves, time = list(ground), 4.0
     for k in range(1, made.joints + 1):
         home = _stowed(made)[k - 1]
@@ -92,7 +91,7 @@ def scenarios(made: Made, folder: Path) -> dict[str, Path]:
             time += 3.0
     arm = {"phases": phases, "moves": moves, "landing": {"at": time, "duration": 6}}
     found = {}
-    for name, values in zip(SCENARIO_NAMES, (hover, circle, arm), strict=True):
+    for name, values in zip(SCENARIO_NAMES, (hover, {"trajectory": circle}, arm), strict=True):
         found[name] = folder / f"{made.name}_{name.replace(' ', '_')}.yaml"
         found[name].write_text(yaml.safe_dump({"description": f"{name}."} | values))
     return found
@@ -125,7 +124,9 @@ def _numbers(made: Made, mass: float) -> dict[str, Any]:
         "effort_limit": round(0.93 * stall, 3),
         "torque_per_current": round(1.304 * stall / 3.0, 4),
     }
-    values["air"] |= {"drag": [round(one * (mass / 2.2) ** (2 / 3), 3) for one in (0.15, 0.15, 0.2)]}
+    values["air"] |= {
+        "drag": [round(one * (mass / 2.2) ** (2 / 3), 3) for one in (0.15, 0.15, 0.2)]
+    }
     joints = [
         {"name": f"alpha_{k + 1}", "range_deg": [-110, 110], "stowed_deg": stowed}
         for k, stowed in enumerate(_stowed(made))
@@ -189,6 +190,6 @@ def _model(made: Made) -> str:
         f'<inertial pos="0 0 0" mass="{base:.6g}" diaginertia="{inertia}"/>'
         '<site name="imu" pos="0 0 0" size="0.005"/>'
         f'<geom type="box" size="{0.3 * made.radius:.4f} {0.2 * made.radius:.4f} 0.012" mass="0" '
-        f'material="{PICTURED}"/>{feet}{"".join(arm)}{"</body>" * made.joints}</body>'
-        '<include file="parts/payload.xml"/></worldbody><include file="parts/sensors.xml"/></mujoco>'
+        f'material="carbon"/>{feet}{"".join(arm)}{"</body>" * made.joints}</body>'
+        '</worldbody><include file="parts/sensors.xml"/></mujoco>'
     )

@@ -147,7 +147,7 @@ def test_the_hover_of_every_vehicle_is_in_the_range_of_the_autopilot():
 @pytest.mark.parametrize(
     "key",
     [
-        *("model", "mass", "rotors", "joints", "servos", "autopilot"),
+        *("model", "mass", "rotors", "joints", "servos"),
         *("air", "sensors", "variation"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 from collections.abc import Iterable
+from dataclasses import replace
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
@@ -132,7 +133,25 @@ def run(options: argparse.Namespace) -> int:
     }
     changes = {name: value for name, value in changes.items() if value is not None}
     settings = flight_settings.settings(**given, vehicle_changes=changes, command=command_line())
+    for line in (missed := missed_margins(settings)):
+        say(f"note: {line}")
+    settings = replace(settings, notes=settings.notes + missed)
     return fly(settings, video, report)
+
+
+def missed_margins(settings: FlightSettings) -> tuple[str, ...]:
+    """Return lines about margins that the vehicle of a flight lacks with its profile.
+
+    The shipped vehicles with their own profiles have them; these flights begin without the model,
+    which takes a second. Nodes of the user have no model.
+    """
+    profile, shipped = settings.profile, configuration.root()
+    own = profile.name == settings.vehicle.profile(settings.controller)
+    if settings.foreign or (own and settings.vehicle.file.is_relative_to(shipped)):
+        return ()
+    from uam_lab.experiments.margins.kept import missed
+
+    return missed(profile, sorted({0.0, settings.payload_mass}))
 
 
 def fly(

@@ -13,7 +13,7 @@ from pathlib import Path
 from uam_control.settings import configuration
 from uam_lab.cli import vehicle_design, vehicle_import
 from uam_lab.cli.command import Command, Subcommands
-from uam_lab.cli.fly import fly
+from uam_lab.cli.fly import fly, missed_margins
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.flights.vehicle.lab_file import load_lab, template
@@ -77,11 +77,14 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.flights.vehicle.vehicle_engine import VehicleEngine  # needs ROS
 
     settings = settings_of(lab, command_line(), options.dry_run)
+    missed = missed_margins(settings)
+    if missed and not options.dry_run:
+        raise SettingsError(f"{missed[0]}: uam vehicle design, or another profile in the lab file")
     out = options.out
     if out is None:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         out = new_folder(lab.out.expanduser(), f"{stamp}-{in_a_name(settings.scenario.name)}")
-    settings = dataclasses.replace(settings, out=out)
+    settings = dataclasses.replace(settings, out=out, notes=settings.notes + missed)
     engine = VehicleEngine(lab).fly
     return fly(settings, video=False, report=options.report, engine=engine, name="vehicle")
 

@@ -35,7 +35,5 @@ def _merged(shipped: Section, given: Section) -> SimpleNamespace:
             found[name] = _merged(shipped.section(name), inner)
             continue
         of = given if given.has(name) else shipped
-        found[name] = (
-            of.numbers(name, len(value)) if isinstance(value, list) else of.positive(name)
-        )
+        found[name] = of.numbers(name, len(value)) if isinstance(value, list) else of.positive(name)
     return SimpleNamespace(**found)

@@ -29,9 +29,7 @@ def files_of(described: VehicleDescription, folder: Path) -> dict[str, Path]:
     for file in found.values():
         if file.exists() and not file.read_text(encoding="utf-8").startswith(MADE):
             raise DesignError(f"{file} is not a design's: --out writes to another folder")
-    return found | {
-        name: folder / f"{described.file.stem}_{name}.png" for name, _ in PICTURES
-    }
+    return found | {name: folder / f"{described.file.stem}_{name}.png" for name, _ in PICTURES}
 
 
 def write(made: Design, files: Mapping[str, Path]) -> None:

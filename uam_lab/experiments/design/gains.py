@@ -104,9 +104,7 @@ def _attitude(
     }
 
 
-def _arm(
-    facts: Facts, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
-) -> dict[str, Any]:
+def _arm(facts: Facts, found: Bandwidths, criteria: SimpleNamespace, fixed: dict) -> dict[str, Any]:
     torque = criteria.authority.servo * facts.servo
     # the integral's limit is one number for all joints: what none of them exceeds
     most = 0.5 * float(np.min(torque / facts.joints))

@@ -1,7 +1,7 @@
 """Whether a vehicle has the margins that the profile which flies it counts on.
 
-The supervisor's limit of late setpoints is the profile's `delay_margin`: with less in the vehicle it
-acts too late. The model is that of `uam margins`, stowed, with the initial gains.
+The supervisor's limit of late setpoints is the profile's `delay_margin`: with less in the vehicle
+it acts too late. The model is that of `uam margins`, stowed, with the initial gains.
 """
 
 from __future__ import annotations
