@@ -230,8 +230,6 @@ def document(
         hand = {"end_effector": Told("end_effector", DERIVED, "site of the model")}
     return {
         "model": Told(f"{name}.xml", DERIVED),
-        "profiles": {k: Told(v, ASSUMED) for k, v in usual.mapping("profiles").items()},
-        "autopilot": Told(usual.text("autopilot"), ASSUMED, "uam vehicle design makes both"),
         "control_period": Told(0.004, ASSUMED, "250 Hz"),
         "mass": Told(mass, FILE, f"sum of the bodies, magnet of {magnet_mass(parts):g} kg"),
         "gravity": Told(GRAVITY, ASSUMED),
