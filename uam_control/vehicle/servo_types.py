@@ -37,6 +37,18 @@ def merged(servos: list[Section]) -> dict[str, Any]:
     """Return the entries of all joints as one mapping; a list where joints differ."""
     entries = {}
     for key in servos[0].values:
-        values = [one.entry(key) for one in servos]
+        if lacking := [one for one in servos if key not in one.values]:
+            raise lacking[0].error(key, "missing; another type has it")
+        values = [one.values[key] for one in servos]  # not asked for: an unknown one is refused
         entries[key] = values[0] if all(one == values[0] for one in values) else values
     return entries
+
+
+def apart(
+    numbers: dict[str, Any], joints: int, where: str, error: type[ValueError]
+) -> list[Section]:
+    """Return the entries of each joint of what `merged` returns; where, error: see `Section`."""
+    return [
+        Section({k: v[i] if isinstance(v, list) else v for k, v in numbers.items()}, where, error)
+        for i in range(joints)
+    ]

@@ -10,6 +10,7 @@ from typing import Any
 
 from uam_control.settings.section import Section
 from uam_control.vehicle.plant_numbers import NOT_OF_THE_PLANT, check_plant_numbers
+from uam_control.vehicle.servo_types import apart
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.records.results.metrics import plain
 
@@ -32,7 +33,9 @@ def checked(given: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, A
             _check_alike(name, value, entry[last])
             entry[last] = found[name]
     if found.keys() - {EFFECTS}:
-        check_plant_numbers(Section(changed, WHERE, SettingsError))
+        where = f"{WHERE} servos"
+        servos = apart(changed["servos"], len(changed["joints"]), where, SettingsError)
+        check_plant_numbers(Section(changed, WHERE, SettingsError), servos)
     return found
 
 
