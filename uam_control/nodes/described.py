@@ -1,8 +1,11 @@
 """The read-only parameters `vehicle` and `scenario` of a node, names or files, and its options."""
 
+import numpy as np
 from rclpy.node import Node
 
+from uam_control.arm.chain import Chain
 from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_scenario
+from uam_control.mission.motion.flyer import Flyer
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
 from uam_control.vehicle import (
@@ -11,6 +14,7 @@ from uam_control.vehicle import (
     VehicleError,
     load_description,
 )
+from uam_msgs_py.messages.navigation import hand_message
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 
 PARAMETER = "vehicle"
@@ -36,3 +40,12 @@ def described_scenario(node: Node, vehicle: VehicleDescription) -> Scenario:
         return load_scenario(name, vehicle, options)
     except ScenarioError as error:
         raise ParameterError(f"scenario: {error}") from None
+
+
+def described_hand(vehicle: VehicleDescription) -> Chain | None:
+    """Return the arm of a vehicle with an end effector, else None; compiles the hand's message."""
+    flyer = Flyer.with_hand(vehicle)
+    if flyer is None:
+        return None
+    hand_message(0, flyer.chain, np.zeros(len(vehicle.coordinates)))
+    return flyer.chain

@@ -22,8 +22,7 @@ from uam_control.mission import (
     Scenario,
     StartParameters,
 )
-from uam_control.mission.motion.flyer import Flyer
-from uam_control.nodes.described import described_scenario, described_vehicle
+from uam_control.nodes.described import described_hand, described_scenario, described_vehicle
 from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
@@ -128,7 +127,7 @@ class MissionNode(UamNode):
         self._preflight = self.publisher(topics.PREFLIGHT)
         self._path = self.publisher(topics.PATH)
         self._hand = self.publisher(topics.END_EFFECTOR_REFERENCE)
-        self._flyer, self._hand_due = Flyer.with_hand(vehicle), 0  # [ns]
+        self._chain, self._hand_due = described_hand(vehicle), 0  # [ns]
         self._path_of = ""  # the plan that was published, see _publish_path
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
@@ -240,11 +239,11 @@ class MissionNode(UamNode):
         self._reference.publish(
             self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
         )
-        if stage.flying and self._flyer and not 0 <= self._hand_due - stage.ahead <= HAND_PERIOD:
+        if stage.flying and self._chain and not 0 < self._hand_due - stage.ahead <= HAND_PERIOD:
             self._hand_due = stage.ahead + HAND_PERIOD
             if self._hand.get_subscription_count():
                 chi = output.reference[CHI]
-                self._hand.publish(hand_message(stage.ahead, self._flyer.chain, chi))
+                self._hand.publish(hand_message(stage.ahead, self._chain, chi))
 
     def _publish_status(self, stamp: int) -> None:
         """Publish arming when it changes, and the status when it changes and twice a second."""

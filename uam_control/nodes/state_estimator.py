@@ -11,8 +11,7 @@ import numpy as np
 from uam_control.coordinates import CHI
 from uam_control.estimation import catalogue
 from uam_control.laws.catalogue import DEFAULT
-from uam_control.mission.motion.flyer import Flyer
-from uam_control.nodes.described import described_vehicle
+from uam_control.nodes.described import described_hand, described_vehicle
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage, estimator_stage
@@ -68,8 +67,7 @@ class StateEstimatorNode(UamNode):
         self._writer = TrajectoryWriter(vehicle.coordinates)
         self._odometry = self.publisher(topics.ODOMETRY)
         self._hand = self.publisher(topics.END_EFFECTOR)
-        flyer = Flyer.with_hand(vehicle)
-        self._chain = flyer and flyer.chain
+        self._chain = described_hand(vehicle)
         self._bias = self.publisher(topics.IMU_BIAS)
         self._body = frame(self, topics.BODY)
         self._bias_writer = ImuWriter(self._body)
