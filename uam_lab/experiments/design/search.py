@@ -135,7 +135,9 @@ class Search:
         late = c.joint / age
         torques = c.authority.servo * facts.servo
         strong = np.sqrt(torques / (c.feedback.stiffness * c.saturation.joint * facts.joints))
-        for name, one, torque in zip(described.joint_names, strong, torques, strict=True):
+        for name, one, torque in zip(
+            described.coordinates[YAW + 1 :], strong, torques, strict=True
+        ):
             text = f"samples and commands {1e3 * age:.0f} ms late"
             self._limits.setdefault(name, text if late < one else f"torque {torque:.2g} N m")
         return np.minimum(late, strong)
