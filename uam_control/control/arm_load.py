@@ -15,11 +15,11 @@ import numpy as np
 
 from uam_control.arm.chain import Chain, ChainParameters
 from uam_control.arm.dynamics import inverse_dynamics
-from uam_control.arm.kinematics import ORIGIN
+from uam_control.arm.kinematics import DOWN, ORIGIN, vehicle_centre
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X, Z
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler, rotate_back
-from uam_control.maths.vectors import cross, plus, times, vector
+from uam_control.maths.vectors import cross, minus, plus, times, vector
 from uam_control.settings.parameter_set import ParameterError, number, switch
 from uam_control.vehicle import GRAVITY
 
@@ -62,7 +62,7 @@ def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float
 
     reference: (3, 6 + n), see `coordinates`; turning: also for its angular acceleration. The moment
     is what the rotors must add because of the arm, and of a base whose centre of mass is beside
-    its origin; about the origin, where thrust acts.
+    its origin; about the origin, where thrust acts. Thrust has the direction of the specific force.
     """
     chain, count = load.chain, len(load.torques)
     acceleration = reference[CHI_DDOT, X:ROLL].copy()
@@ -71,9 +71,12 @@ def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float
     rates = vector(reference[CHI_DOT, ROLL:ALPHA])
     change = vector(reference[CHI_DDOT, ROLL:ALPHA]) if turning else ORIGIN
     motion = reference[:, ALPHA:]
-    _, moment = inverse_dynamics(chain, motion, force, rates, change, load.torques)
+    push, moment = inverse_dynamics(chain, motion, force, rates, change, load.torques)
     for j in range(count):
         speed = reference[CHI_DOT, ALPHA + j]
         friction = chain.friction[j] * math.tanh(speed / FRICTION_SPEED)
         load.torques[j] += chain.damping[j] * speed + friction
-    return plus(moment, cross(vector(chain.base_centre), times(chain.base_mass, force)))
+    moment = plus(moment, cross(vector(chain.base_centre), times(chain.base_mass, force)))
+    # nothing pushes aside what the arm's motion pushes: the whole vehicle gives way
+    aside = minus(push, times(chain.masses.sum(), force))
+    return minus(moment, cross(vehicle_centre(chain, reference[CHI, ALPHA:], DOWN), aside))
