@@ -131,6 +131,7 @@ def test_it_flies_through_the_nodes(name, tmp_path):
 
 def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
     command = ["campaign", "--vehicle", "s500_arm3", "--scenario", "hover", "--flights", "1"]
+    command += ["--jobs", "1"]
     assert main([*command, "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out.count("| alpha_3 |") == 1
     found = json.loads((tmp_path / "campaign.json").read_text())
@@ -143,7 +144,7 @@ def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
 @pytest.mark.long
 def test_a_comparison_flies_the_joints_of_the_vehicle(tmp_path):
     command = ["compare", "--vehicle", "s500_arm3", "--scenario", "hover", "--rows", "proposed"]
-    one = ["--seeds", "1", "--payload-mass", "0"]
+    one = ["--seeds", "1", "--payload-mass", "0", "--jobs", "1"]
     assert main([*command, *one, "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "comparison.json").read_text())
     assert (found["vehicle"], found["scenario"]) == ("s500_arm3", "hover")
@@ -159,7 +160,8 @@ def test_a_fault_matrix_reaches_the_sixth_rotor(tmp_path, capsys):
     file.write_text(yaml.safe_dump(matrix))
     assert main(["faults", "--matrix", str(file), "--out", str(out)]) == 2
     assert "motor 6: the vehicle has 4" in capsys.readouterr().err and not out.exists()
-    assert main(["faults", "--matrix", str(file), "--vehicle", "hexa_arm", "--out", str(out)]) == 0
+    command = ["faults", "--matrix", str(file), "--vehicle", "hexa_arm", "--jobs", "1"]
+    assert main([*command, "--out", str(out)]) == 0
     found = json.loads((out / "faults.json").read_text())
     assert found["vehicle"] == "hexa_arm"
     assert [flight["outcome"] for flight in found["flights"]] == ["completed", "completed"]
