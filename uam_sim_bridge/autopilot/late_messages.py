@@ -39,12 +39,12 @@ class LateMessages:
         self.arrays = LateArrays(np.zeros(WAITING), kinds, np.zeros((WAITING, VALUES)), self.memory)
         self._functions: deque[Callable[[], object]] = deque()
         self._push = bound(push, self.arrays, 0.0, 0, np.zeros(VALUES))
-        self._none = np.zeros(VALUES)
+        self._arrives, self._take = bound(arrives, self.arrays, 0.0), bound(take, self.arrays)
 
     def send(self, due: float, deliver: Callable[[], object]) -> None:
         """Let `deliver` be called by `arrive` at `due` [s]."""
         self._functions.append(deliver)
-        self._push(due, OTHER, self._none)
+        self._push(due, OTHER, np.zeros(VALUES))
 
     def send_values(self, due: float, kind: int, values: Sequence[float]) -> None:
         """Send a POSE or RATES."""
@@ -55,8 +55,8 @@ class LateMessages:
     def arrive(self, time: float, deliver: dict[int, Callable[[np.ndarray], object]]) -> None:
         """Deliver what is due at `time` [s]; deliver: for POSE and RATES."""
         a = self.arrays
-        while arrives(a, time):
-            row = take(a)
+        while self._arrives(time):
+            row = self._take()
             kind = a.kinds.item(row)
             if kind == OTHER:
                 self._functions.popleft()()

@@ -111,9 +111,7 @@ def warm_up(laws: Iterable[str]) -> None:
 
 def _flight(law: str) -> DirectFlight:
     scenario = load_scenario("hover")
-    effects = dict(presets.laboratory())  # a copy: the preset is read once
-    del effects["network_delay"]  # with it bridge and autopilot are plain Python
-    vehicle = Vehicle.load().changed({"effects": effects})
+    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
     return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
 
