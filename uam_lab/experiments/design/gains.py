@@ -12,6 +12,7 @@ import numpy as np
 
 from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ROLL, YAW
+from uam_control.laws import lyapunov
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
 from uam_control.settings.section import read_section
@@ -84,7 +85,6 @@ def _position(
     values = _feedback(found.position, criteria, criteria.adaptation.position, fixed)
     return values | {
         "inertia": [described.mass] * len(found.position),
-        "integral_gain": listed(criteria.feedback.integral * found.position**3),
         "thrust_min": rounded(LEAST_THRUST * weight),
         "thrust_max": rounded(thrust),
         "tilt_max": tilt,
@@ -106,13 +106,12 @@ def _attitude(
 
 def _arm(facts: Facts, found: Bandwidths, criteria: SimpleNamespace, fixed: dict) -> dict[str, Any]:
     torque = criteria.authority.servo * facts.servo
-    # the integral's limit is one number for all joints: what none of them exceeds
+    # the limit of theta_hat is one number for all joints: what none of them exceeds
     most = 0.5 * float(np.min(torque / facts.joints))
     return _feedback(found.arm, criteria, criteria.adaptation.arm, fixed) | {
         "inertia": listed(facts.joints),
         "lambda_table": [1.0] * len(found.arm),
-        "integral_gain": listed(criteria.feedback.integral * found.arm**3),
-        "integral_limit": rounded(most),
+        "bias_limit": rounded(most),
         "torque_max": listed(torque),
         "arm_feedforward": True,
     }
@@ -157,7 +156,22 @@ def _bridge(
 def _feedback(
     second: np.ndarray, criteria: SimpleNamespace, share: float, fixed: dict
 ) -> dict[str, Any]:
-    return _law(criteria.feedback.stiffness * second**2, second, criteria, share, fixed)
+    """Return lambda_1, lambda_2, Q and bias_gain of a law with theta_hat.
+
+    Its gain on e is lambda_1 + Gamma p22, that on the integral of e Gamma p12 (docs/law.md); P is
+    that of the whole gain on e.
+    """
+    whole = _law(criteria.feedback.stiffness * second**2, second, criteria, share, fixed)
+    given = ("lambda_1", "lambda_2", "q_position", "q_velocity")
+    _, p12, p22 = lyapunov.solve(*(np.array(whole[name]) for name in given))
+    gamma = criteria.feedback.integral * second**3 / p12
+    first = np.array(whole["lambda_1"]) - gamma * p22
+    q_position = 2.0 * first * p12
+    return whole | {
+        "lambda_1": listed(first),
+        "q_position": listed(q_position),
+        "bias_gain": listed(gamma),
+    }
 
 
 def _law(
