@@ -7,12 +7,10 @@ from collections import deque
 from pathlib import Path
 
 import pytest
-import yaml
 
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_control.settings.configuration import path
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.metrics import compute
 from uam_lab.records.results.outcome import grasp_decisions
@@ -84,27 +82,34 @@ def test_a_payload_beside_its_stand_is_a_shortfall():
     assert shortfall.startswith("payload absent, not within 0.08 m of its place; payload at (")
 
 
+TABLE_PICK = """
+arm_start: {alpha_1_deg: 0, alpha_2_deg: 90}
+environment:
+  - {kind: table, position: [-0.68, 0.5], size: [0.3, 0.3], height: 0.537}
+  - {kind: payload, rests_on: table, position: [-0.789, 0.5], size: [0.08, 0.05, 0.03]}
+moves:
+  - {coordinate: z, from: 0, until: 2, to: 0.8}
+  - {coordinate: x, from: 2, until: 5, to: -1.0}
+  - {coordinate: y, from: 5, until: 7, to: 0.5}
+  - {coordinate: alpha_1, from: 2, until: 5, to_deg: 45}
+  - {coordinate: alpha_2, from: 2, until: 5, to_deg: 45}
+  - {coordinate: z, from: 7, until: 9, to: 0.74}
+  - {coordinate: z, from: 9.6, until: 11.6, to: 1.1}
+  - {coordinate: x, from: 12, until: 15, to: 0.0}
+  - {coordinate: y, from: 12, until: 15, to: 0.0}
+  - {coordinate: alpha_1, from: 16.5, until: 18.5, to_deg: 0}
+  - {coordinate: alpha_2, from: 16.5, until: 18.5, to_deg: 90}
+magnet: [{at: 9.2, energised: true}, {at: 15.5, energised: false}]
+payload: {mass: 0.2}
+landing: {at: 18.5, duration: 5}
+"""
+
+
 def test_a_payload_is_picked_from_a_table_by_the_scenario_alone(tmp_path):
     """0.2 m lower than the stand, 0.5 m to the left, another payload: 0.537 + 0.03 + 0.2 = 0.767 m,
-    the height of the usual grip point."""
-    document = yaml.safe_load(path("scenarios/quick_pick.yaml").read_text())
-    for move in document["moves"]:
-        move["to"] = move["to"] - 0.2 if move["coordinate"] == "z" else move.get("to")
-        if move["coordinate"] == "y":
-            move |= {"from": 2, "until": 6, "to": 0.5}
-    document["moves"] = [{k: v for k, v in m.items() if v is not None} for m in document["moves"]]
-    document["environment"] = [
-        {"kind": "table", "position": [-1.0, 0.5], "height": 0.537},
-        {
-            "kind": "payload",
-            "rests_on": "table",
-            "position": [-0.789, 0.5],
-            "size": [0.08, 0.05, 0.03],
-            "material": "steel",
-        },
-    ]
+    the height of the usual grip point. The feet stay beside the table."""
     file = tmp_path / "table_pick.yaml"
-    file.write_text(yaml.safe_dump(document))
+    file.write_text(TABLE_PICK)
     a_flight = flight(str(file))
     a_flight.run()
     assert grasps(a_flight) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
