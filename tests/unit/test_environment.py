@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import mujoco
@@ -9,6 +10,7 @@ import pytest
 import yaml
 
 from uam_control.mission import ScenarioError, load_scenario
+from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
 from uam_lab.flights import arm_on_ground
 from uam_sim_bridge.plant import Vehicle
@@ -68,6 +70,30 @@ def test_entries_replace_the_usual_ones(tmp_path):
     assert "box" in names and "stand" not in names and "drop_mat" not in names
     assert model.body("payload").pos[0] == 50.0  # out of sight: nobody asked for one
     assert scenario(tmp_path, []).surroundings == {}
+
+
+def test_a_vehicle_file_from_before_loses_its_own_surroundings(tmp_path):
+    """It had stand and payload; now they are the scenario's, 1 m farther here."""
+    shutil.copytree(path("vehicle/parts"), tmp_path / "parts")
+    own = (
+        '<body name="stand" pos="-0.789 0 0"><geom name="stand_top" size="0.1"/></body>'
+        '<body name="payload" pos="-0.789 0 0.747"><freejoint name="payload"/>'
+        '<geom name="payload" size="0.02"/></body></worldbody>'
+    )
+    model = path("vehicle/s500_arm.xml").read_text().replace("</worldbody>", own)
+    (tmp_path / "s500_arm.xml").write_text(model)
+    world = tmp_path / "parts/world.xml"
+    world.write_text(world.read_text().replace('<body name="environment"/>', ""))
+    (tmp_path / "mine.yaml").write_text(path("vehicle/s500_arm.yaml").read_text())
+    entries = [
+        {"kind": "stand", "position": [-1.789, 0]},
+        {"kind": "payload", "rests_on": "stand"},
+    ]
+    around = scenario(tmp_path, entries).surroundings
+    vehicle = Vehicle.of(load_description(tmp_path / "mine.yaml")).changed(around)
+    found = vehicle.compile(0.2)
+    assert found.body("payload").pos.tolist() == [-1.789, 0.0, 0.747]
+    assert found.body("stand").pos[0] == -1.789
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def add_surroundings(spec: mujoco.MjSpec, entries: Sequence[Entry], payload_mass
     for old in (PAYLOAD, "stand", "drop_mat"):  # of a vehicle file with surroundings of its own
         if (body := spec.body(old)) is not None:
             spec.delete(body)
-    place = spec.body(PLACE) or spec.worldbody
+    place = spec.body(PLACE) or spec.worldbody.add_body(name=PLACE)
     payloads = [one for one in entries if one["kind"] == PAYLOAD]
     for entry in entries:
         if entry["kind"] != PAYLOAD:
