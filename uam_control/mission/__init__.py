@@ -1,7 +1,7 @@
 """Missions: scenarios, smooth references, and the sequence of a flight from waiting to landed."""
 
+from uam_control.mission.compiled_sequence import Mission
 from uam_control.mission.feasibility import Feasibility, InfeasibleReference
-from uam_control.mission.flight_sequence import Mission
 from uam_control.mission.mission_output import MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.permission import ChecklistReport

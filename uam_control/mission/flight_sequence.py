@@ -29,7 +29,7 @@ from uam_control.mission.mission_output import (
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.motion.braking import leaves_geofence
 from uam_control.mission.motion.trajectory import empty_reference
-from uam_control.mission.nominal_tick import REAL, WHOLE, MissionArrays
+from uam_control.mission.nominal_tick import REAL, WHOLE
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.permission import ChecklistReport
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
@@ -56,15 +56,14 @@ from uam_control.vehicle import VehicleDescription
 NOBODY = Authority()  # has taken control from the companion
 # landings after a hold that nobody asked for here: not where a stand is
 UNASKED = (Event.HELD_TOO_LONG, Event.CLEAR_TO_LAND)
-FOLLOWS = (State.TAKING_OFF, State.FLYING, State.LANDING)  # states that follow the scenario
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
-class Mission:
+class FlightSequence:
     """Steps through a scenario under supervision; its only time is the stamps of the steps.
 
     It waits for `start` before it desires an armed autopilot; after the end of a flight `start`
-    begins the next one. `arrays`: what the compiled ticks of a flight use, None before it.
+    begins the next one.
     """
 
     _stamp, _takeoff, _ground = Number(), Number(), Number()
@@ -98,7 +97,7 @@ class Mission:
         reference[:] = 0.0
         reference[CHI, ARM] = self.scenario.arm_start
         vars(self.output).update(vars(MissionOutput(reference)))
-        self._supervisor, self.arrays = Supervisor(parameters), None
+        self._supervisor = Supervisor(parameters)
         self._parameters = parameters
         self._requests: deque[tuple[OperatorCommand, GoalPose | Points | None]] = deque()
         self.plans_flown = 0  # in this flight
@@ -548,76 +547,7 @@ class Mission:
         self._arrange()
 
     def _arrange(self) -> None:
-        """Collect the arrays of a flight."""
-        supervisor, m, p = self._supervisor, self.memory, self._parameters
-        m["height"], m["speed"] = p.touchdown_height, p.touchdown_speed
-        m["half"] = self.scenario.landing.half
-        self.arrays = MissionArrays(
-            *(self._guidance.arrays, supervisor.checks.arrays),
-            *(supervisor.memory, self._watch.memory, m),
-        )
-
-    @property
-    def nominal(self) -> bool:
-        """Whether the next steps only follow the scenario, until a value or a message demands more:
-        then `follow_scenario` does them, see `look_ahead`."""
-        output, supervisor, guidance = self.output, self._supervisor, self._guidance
-        decision = supervisor.decision
-        ended = self._over or output.done or self._end is not None
-        return (
-            guidance is not None
-            and output.state in FOLLOWS
-            and output.flying
-            and decision.guide is Guide.SCENARIO
-            and decision is self._followed
-            and supervisor.calm
-            and guidance.on_path(self._stamp)
-            and self._watch.settled
-            and self._touchdown.idle
-            and not (ended or self._requests or self._override.given)
-            and self._standing is None
-            and self._descent is None
-            and self._beside is None
-            and self._magnet_on(decision) == output.magnet
-            and self._phase(decision) == output.phase
-        )
-
-    def look_ahead(self, stamps: np.ndarray) -> int:
-        """Compute the path at the next stamps (m,) [s], at most `guidance.MOST`, while `nominal`.
-
-        Returns for how many of them nothing of the scenario changes.
-        """
-        landing, state = self.scenario.landing, self.output.state
-        lands = state is State.LANDING
-        until = landing.end + self._parameters.touchdown_timeout if lands else landing.at
-        self.memory["takes_off"] = state is State.TAKING_OFF
-        self._watch.due_from = self._watch_from
-        until = min(self._phases.until, self._magnet.until, until)
-        return self._guidance.look_ahead(stamps, until)
-
-    @property
-    def looked_ahead(self) -> int:
-        """Number of the steps that `follow_scenario` has done since `look_ahead`."""
-        return self._guidance.followed
-
-    def watch(self) -> bool:
-        """Step the executive of the grasps after a compiled step; return whether the steps that
-        `look_ahead` has computed still are to come."""
-        path = self._guidance.trajectory
-        self.watch_payload()
-        self._watch.due_from = self._watch_from
-        return self.nominal and self._guidance.trajectory is path
-
-    def resume(self, state: np.ndarray, authority: Authority) -> None:
-        """Go on after compiled steps, the last one with state (3, 6 + n) and authority."""
-        seen, self.output.time = self._in_flight, self._stamp - self._takeoff
-        seen.on_ground, seen.authority = self._is_on_ground(state), authority
-
-    @property
-    def _watch_from(self) -> float:
-        """Scenario time [s] from which on the executive of the grasps is due."""
-        off = self._parameters.grasp_checks == "off" or self.output.state is not State.FLYING
-        return math.inf if off else self._watch.executive.due_from
+        """Called when guidance or parameters of a flight are new."""
 
     def _is_on_ground(self, state: np.ndarray) -> bool:
         p = self._parameters
