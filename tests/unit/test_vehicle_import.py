@@ -129,6 +129,22 @@ def test_what_is_not_in_the_file_is_assumed_and_says_so(tmp_path):
     assert "missing or assumed:" in (tmp_path / "out" / "mine.txt").read_text()
 
 
+@pytest.mark.parametrize(
+    ("given", "count", "told"),
+    [({}, 4, "assumed: layout quad_x"), ({"rotors.layout": "coax_x8"}, 8, "asked: layout coax_x8")],
+)
+def test_rotors_that_the_file_does_not_have_stand_in_a_layout(tmp_path, given, count, told):
+    """0.3 m from the middle; opposite rotors turn alike, those above each other do not."""
+    answers = Answers(given | {"rotors.distance": 0.3})
+    made, _ = imported(tmp_path, drone(count=0), answers=answers)
+    rotors = made.description.rotors
+    assert len(rotors) == count
+    assert [math.hypot(*one.position[:2]) for one in rotors] == pytest.approx([0.3] * count, 1e-3)
+    assert sum(one.counter_clockwise for one in rotors) == count // 2
+    text = (tmp_path / "out" / "mine.yaml").read_text()
+    assert f"# position {told}; direction {told}" in text
+
+
 def test_answers_take_the_place_of_assumptions(tmp_path):
     file = write(tmp_path, "rotors: {thrust_max: 9.0}\nservo: XM430-W350\n", "answers.yaml")
     answers = Answers(read_answers(file, ["rotors.lag_up=0.04"]))

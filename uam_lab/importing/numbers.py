@@ -19,6 +19,7 @@ from uam_lab.importing.structure import Parts
 
 USUAL = f"vehicle/{DEFAULT_VEHICLE}.yaml"  # whose air, sensors, variation and magnet are taken
 GRAVITY = 9.81  # [m/s^2]
+WIDEST = 0.75  # of the distance of neighbours: a wider shape is no propeller
 MAGNET_MASS = 0.07  # [kg] of parts/magnet.xml, which the import adds
 Tree = dict[str, Any]  # of Told, trees and lists of trees
 
@@ -40,59 +41,68 @@ def magnet_mass(parts: Parts) -> float:
 
 def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     """Return the section `rotors`."""
-    assumed = answers.assumed
-    if not parts.rotors:
-        _lay_out(parts, answers)
-    places = np.array([one.position for one in parts.rotors])
+    layout = _layout(parts, answers)
+    radius = _radius(parts, answers)
+    thrust, speed = _thrust(parts, answers, mass, radius.value)
+    lag = answers.assumed.number("lag_per_radius") * radius.value
+    moment = answers.assumed.number("moment_per_radius") * radius.value
+    curve = answers.assumed.number("curve_factor")
+
+    def told(name: str, usual: float, why: str, most: float = math.inf) -> Told:
+        return _known(parts, name) or answers.number(f"rotors.{name}", usual, why, most)
+
+    return {
+        "layout": layout,
+        "radius": radius,
+        "thrust_coefficient": thrust,
+        "speed_max": speed,
+        "curve_factor": answers.number("rotors.curve_factor", curve, "as of the S-500", 1.0),
+        "moment_ratio": told("moment_ratio", moment, "by the radius"),
+        "lag_up": told("lag_up", lag, "by the radius"),
+        "lag_down": told("lag_down", 2.0 * lag, "twice that of lag_up"),
+        "efficiency": Told([1.0] * len(parts.rotors), ASSUMED),
+    }
+
+
+def _layout(parts: Parts, answers: Answers) -> list[Tree]:
+    """Return name, position and direction of each rotor, by a layout if the file has none."""
+    laid = None if parts.rotors else _lay_out(parts, answers)
     turn, stated = rotors.turns(parts.rotors)
     origin = (FILE, "") if stated else (ASSUMED, "neighbours turn in opposite directions")
-    shown = [one.radius for one in parts.rotors if one.radius > 0.0]
-    gap = rotors.neighbours(places)
-    if shown and max(shown) < 0.75 * gap:
-        radius = Told(float(f"{max(shown):.4g}"), DERIVED, "half width of the rotor's shape")
-    else:
-        radius = answers.number(
-            "rotors.radius", assumed.number("radius_per_gap") * gap, "from neighbours' distance"
-        )
-    r = radius.value
-    weight = mass * GRAVITY
+    entries = []
+    for i, one in enumerate(parts.rotors):
+        place = [round(float(x), 4) + 0.0 for x in one.position]
+        at = (FILE, one.name) if laid is None else (laid.origin, one.name)
+        entry = {"name": f"rotor_{i + 1}", "position": Told(place, *at)}
+        way = origin if laid is None else at
+        entries.append(entry | {"direction": Told("ccw" if turn[i] else "cw", *way)})
+    return entries
+
+
+def _radius(parts: Parts, answers: Answers) -> Told:
+    """Return the radius [m] of the propellers."""
+    gap = rotors.neighbours(np.array([one.position for one in parts.rotors]))
+    shown = max(one.radius for one in parts.rotors)
+    if 0.0 < shown < WIDEST * gap:
+        return Told(float(f"{shown:.4g}"), DERIVED, "half width of the rotor's shape")
+    usual = answers.assumed.number("radius_per_gap") * gap
+    return answers.number("rotors.radius", usual, "from neighbours' distance")
+
+
+def _thrust(parts: Parts, answers: Answers, mass: float, radius: float) -> tuple[Told, Told]:
+    """Return the thrust coefficient [N s^2/rad^2] and the speed [rad/s] at full thrust."""
+    assumed, weight = answers.assumed, mass * GRAVITY
     ratio = assumed.number("thrust_to_weight")
-    usual = ratio * weight / len(places)
+    why = f"{ratio:g} times the weight of {weight:.3g} N"
     thrust = _known(parts, "thrust_max") or answers.number(
-        "rotors.thrust_max", usual, f"{ratio:g} times the weight of {weight:.3g} N"
+        "rotors.thrust_max", ratio * weight / len(parts.rotors), why
     )
-    speed = _known(parts, "speed_max") or Told(
-        float(f"{assumed.number('tip_speed') / r:.4g}"), ASSUMED, "tip speed as of the S-500"
-    )
-    lag = assumed.number("lag_per_radius") * r
-    return {
-        "layout": [
-            {
-                "name": f"rotor_{i + 1}",
-                "position": Told([round(float(x), 4) + 0.0 for x in one.position], FILE, one.name),
-                "direction": Told("ccw" if turn[i] else "cw", *origin),
-            }
-            for i, one in enumerate(parts.rotors)
-        ],
-        "radius": radius,
-        "thrust_coefficient": Told(
-            float(f"{thrust.value / speed.value**2:.5g}"),
-            thrust.origin if thrust.origin != FILE else DERIVED,
-            f"full thrust {thrust.value:g} N {thrust}, at speed_max",
-        ),
-        "speed_max": speed,
-        "curve_factor": answers.number(
-            "rotors.curve_factor", assumed.number("curve_factor"), "as of the S-500", 1.0
-        ),
-        "moment_ratio": _known(parts, "moment_ratio")
-        or answers.number(
-            "rotors.moment_ratio", assumed.number("moment_per_radius") * r, "by the radius"
-        ),
-        "lag_up": _known(parts, "lag_up") or answers.number("rotors.lag_up", lag, "by the radius"),
-        "lag_down": _known(parts, "lag_down")
-        or answers.number("rotors.lag_down", 2.0 * lag, "twice that of lag_up"),
-        "efficiency": Told([1.0] * len(places), ASSUMED),
-    }
+    usual = float(f"{assumed.number('tip_speed') / radius:.4g}")
+    speed = _known(parts, "speed_max") or Told(usual, ASSUMED, "tip speed as of the S-500")
+    coefficient = float(f"{thrust.value / speed.value**2:.5g}")
+    origin = DERIVED if thrust.origin == FILE else thrust.origin
+    reason = f"full thrust {thrust.value:g} N ({thrust}) at speed_max"
+    return Told(coefficient, origin, reason), speed
 
 
 def _known(parts: Parts, name: str) -> Told | None:
@@ -108,8 +118,8 @@ def _known(parts: Parts, name: str) -> Told | None:
     return Told(float(f"{np.mean(values):.5g}"), FILE)
 
 
-def _lay_out(parts: Parts, answers: Answers) -> None:
-    """Place rotors by a layout: the file has none."""
+def _lay_out(parts: Parts, answers: Answers) -> Told:
+    """Place rotors by a layout, as the file has none; return its name."""
     assumed = answers.assumed
     layouts = assumed.mapping("layouts")
     usual = assumed.text("layout")
@@ -134,6 +144,7 @@ def _lay_out(parts: Parts, answers: Answers) -> None:
                 rotors.FoundRotor(name, where, position, np.array([0.0, 0.0, 1.0]), 0.0, facts)
             )
     parts.notes.append(f"rotors: layout {told.value} ({told}), {distance.value:g} m ({distance})")
+    return told
 
 
 @dataclass
