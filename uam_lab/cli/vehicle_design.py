@@ -15,7 +15,7 @@ DONE = 0
 EXAMPLES = """\
 examples:
   uam vehicle design my/quad.yaml            profile, autopilot and pictures beside my/quad.yaml
-  uam vehicle design s500_arm --out mine     in the folder mine
+  uam vehicle design my/quad.yaml --out mine in the folder mine
   uam vehicle design my/quad.yaml --criteria my/margins.yaml      other margins, see docs/tuning.md
 
 A vehicle whose file names neither profiles nor autopilot flies with the design beside it:
