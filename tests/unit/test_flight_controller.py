@@ -47,6 +47,10 @@ def test_remappings_of_a_node_keep_to_that_node():
         ({"fused": True, "engine": "direct"}, "--fused needs --engine ros"),
         ({"inner_rate": 50.0}, "--inner-rate needs --fused"),
         (
+            {"fused": True, "inner_rate": 50.0, "without": ["arm_controller=mine"]},
+            "--inner-rate needs every control node in the process",
+        ),
+        (
             {"parameters": {"flight_controller": {"inner_rate": 5.0}}},
             "only the fused layout has this node",
         ),

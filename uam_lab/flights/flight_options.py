@@ -241,6 +241,13 @@ CONTRADICTIONS: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
         lambda o: o.inner_rate is not None and not o.fused,
         "--inner-rate needs --fused: separate nodes need every message",
     ),
+    (
+        lambda o: (
+            o.inner_rate is not None and any(one.startswith(REPLACEABLE) for one in o.without)
+        ),
+        "--inner-rate needs every control node in the process: with --without the nodes need every "
+        "message",
+    ),
 )
 
 
