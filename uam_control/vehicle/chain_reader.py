@@ -38,6 +38,9 @@ def read_chain(model: mujoco.MjModel, joints: tuple[str, ...], end_effector: str
     joints that are no serial chain of 1 to 7 hinges on the body `base`, and for a site that the
     last link does not carry.
     """
+    places = (model.jnt_axis, model.jnt_pos, model.body_pos, model.body_quat, model.body_inertia)
+    if not all(np.isfinite(one).all() for one in places):
+        raise ValueError("an axis, a place or an inertia is not finite")
     return _Reader(model, joints).chain(end_effector)
 
 
