@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 
 from uam_control.profiles.profile import ProfileError, default_profile
 from uam_control.vehicle import VehicleError, derived_parameters, load_description
+from uam_lab.cli import vehicle
 from uam_lab.cli.main import main
 from uam_lab.experiments.design import search
 from uam_lab.experiments.design.criteria import DesignError, load_criteria
 from uam_lab.experiments.design.facts import Facts, inertias, largest_torque, noise_gains
 from uam_lab.experiments.design.rate_loop import rate_loop
 from uam_lab.experiments.margins.kept import missed
+from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.plant import Vehicle
 
 QUAD = vehicles.Made("small", 1.0, 4, 0.16, 0.02, 2)
@@ -169,3 +171,11 @@ def test_margins_that_no_gains_keep_are_refused(designed, tmp_path, capsys, monk
     asked = ["vehicle", "design", str(designed[0]), "--criteria", str(criteria)]
     assert main([*asked, "--out", str(tmp_path)]) == 2
     assert "no gains" in capsys.readouterr().err
+
+
+def test_a_real_vehicle_without_its_margins_does_not_start(tmp_path, capsys, monkeypatch):
+    lab, line = tmp_path / "lab.yaml", "profile s500 on s500_arm, no payload: unstable"
+    lab.write_text(template())
+    monkeypatch.setattr(vehicle, "missed_margins", lambda settings: (line,))
+    assert main(["vehicle", "--config", str(lab)]) == 2
+    assert line in capsys.readouterr().err

@@ -28,6 +28,7 @@ MOST_P, MOST_D = 0.5, 0.01
 TIPPED = 0.2, 0.4  # [rad] beyond tilt_max at which the supervisor holds, and gives up
 MISSED = 0.5, 1.0  # [s] of missed ticks at which it does
 LEAST_THRUST = 0.05  # share of the weight
+LEAST_TILT = 0.1  # [rad] of tilt_max, for rotors that can hardly lift
 
 
 @dataclass(frozen=True)
@@ -61,13 +62,13 @@ def sections(
 ) -> dict[str, dict[str, Any]]:
     """Return the sections of the profile by node, without `delay_margin`."""
     fixed = read_sections(configuration.path("design/profile.yaml"))
-    position, tilt = _position(described, found, criteria, fixed["position_controller"])
+    position = _position(described, found, criteria, fixed["position_controller"])
     own = {
         "position_controller": position,
         "attitude_controller": _attitude(facts, found, criteria, fixed["attitude_controller"]),
         "arm_controller": _arm(facts, found, criteria, fixed["arm_controller"]),
         "state_estimator": estimator(described, criteria),
-        "mission": _mission(described, found, tilt),
+        "mission": _mission(described, found, position["tilt_max"]),
         "mavlink_bridge": _bridge(described, facts, criteria),
     }
     return {node: fixed.get(node, {}) | values for node, values in own.items()}
@@ -75,21 +76,20 @@ def sections(
 
 def _position(
     described: VehicleDescription, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
-) -> tuple[dict[str, Any], float]:
-    """Return the section of the position controller, and its tilt_max [rad]."""
+) -> dict[str, Any]:
     thrust = criteria.authority.thrust * described.full_thrust
     weight = described.mass * described.gravity
     tilt = math.acos(min(1.0, criteria.authority.weight * weight / thrust))
-    tilt = rounded(min(criteria.authority.tilt, max(tilt, 0.1)))
+    tilt = min(criteria.authority.tilt, max(tilt, LEAST_TILT))
     corner = criteria.attitude_filter * float(np.mean(found.attitude[: YAW - ROLL]))
     values = _feedback(found.position, criteria, criteria.adaptation.position, fixed)
     return values | {
         "inertia": [described.mass] * len(found.position),
         "thrust_min": rounded(LEAST_THRUST * weight),
         "thrust_max": rounded(thrust),
-        "tilt_max": tilt,
+        "tilt_max": rounded(tilt),
         "attitude_cutoff": rounded(corner / (2.0 * math.pi)),
-    }, tilt
+    }
 
 
 def _attitude(

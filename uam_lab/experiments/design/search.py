@@ -36,7 +36,7 @@ from uam_lab.experiments.margins.stack_model import Stack, stack_model
 from uam_sim_bridge.plant import Vehicle
 
 STEP, ROUNDS = 0.92, 40
-RATES, SETPOINTS = "rate loop", "setpoints"
+RATES = "rate loop"
 ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
 
 
@@ -44,8 +44,8 @@ ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
 class Design:
     """A designed vehicle.
 
-    described: with the designed gains of the autopilot; sections: of the profile, by node;
-    limits: loop → what keeps it from being faster; cases: the analysed operating points.
+    described: with the designed gains of the autopilot; profile: for it; limits: loop → what keeps
+    it from being faster; cases: the analysed operating points.
     """
 
     described: VehicleDescription
@@ -92,10 +92,8 @@ class Search:
     """The bandwidths of a vehicle, and what limits them."""
 
     def __init__(self, described: VehicleDescription, criteria: SimpleNamespace) -> None:
-        # gains of the autopilot follow: those of the file are not used
-        self._described = replace(described, autopilot_gains={})
-        self._criteria = criteria
-        self.facts = Facts.of(Vehicle.of(self._described))
+        self._described, self._criteria = described, criteria
+        self.facts = Facts.of(Vehicle.of(described))
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
@@ -145,7 +143,8 @@ class Search:
     def evaluated(self) -> Found:
         """Return the margins with the present bandwidths."""
         bandwidths = self.bandwidths()
-        described = replace(self._described, autopilot_gains=autopilot_gains(bandwidths))
+        gains = self._described.autopilot_gains | autopilot_gains(bandwidths)
+        described = replace(self._described, autopilot_gains=gains)
         own = sections(described, self.facts, bandwidths, self._criteria)
         profile = profile_of(own, Path(f"{described.name}_profile.yaml"), described)
         cases, slower = [], {}
