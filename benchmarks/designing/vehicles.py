@@ -22,13 +22,15 @@ INERTIA = 0.16, 0.18, 0.24  # of the body, parts of mass radius^2
 SHOULDER, SHORT, FOOT = 0.3, 0.03, 0.012  # of the radius to joint 1, magnet below its pivot, foot
 STRONG = 4.0  # stall torque, parts of the torque that holds the arm level
 THRUST_TO_WEIGHT = 2.0
+AXES = {"x": "1 0 0", "y": "0 -1 0", "z": "0 0 1"}  # of a roll, pitch and yaw joint
 SCENARIO_NAMES = ("hover", "circle", "arm motions")
 
 
 @dataclass(frozen=True)
 class Made:
     """A vehicle: mass [kg]; places of rotors, or pairs of coaxial ones; radius [m]; lag of the
-    rotors [s]; joints of the arm; arm: its share of the mass without the magnet."""
+    rotors [s]; joints of the arm; arm: its share of the mass without the magnet; axes: of the
+    joints, by AXES, "" for all about y."""
 
     name: str
     mass: float
@@ -39,6 +41,7 @@ class Made:
     coaxial: bool = False
     arm: float = 0.09
     thrust_to_weight: float = THRUST_TO_WEIGHT
+    axes: str = ""
 
 
 VEHICLES = (
@@ -47,9 +50,9 @@ VEHICLES = (
     Made("hexa_1500", 1.5, 6, 0.20, 0.030, 3),
     Made("quad_2000", 2.0, 4, 0.24, 0.050, 2, thrust_to_weight=1.8),
     Made("x8_2500", 2.5, 4, 0.24, 0.025, 1, coaxial=True),
-    Made("hexa_3000", 3.0, 6, 0.30, 0.060, 4),
+    Made("hexa_3000", 3.0, 6, 0.30, 0.060, 4, axes="zyyz"),
     Made("quad_3750", 3.75, 4, 0.325, 0.100, 4, thrust_to_weight=2.4),
-    Made("octo_4500", 4.5, 8, 0.40, 0.040, 5),
+    Made("octo_4500", 4.5, 8, 0.40, 0.040, 5, axes="xyyzy"),
     Made("x8_5000", 5.0, 4, 0.35, 0.080, 3, coaxial=True),
     Made("hexa_6000", 6.0, 6, 0.45, 0.070, 5, arm=0.12),
     Made("octo_7000", 7.0, 8, 0.50, 0.100, 2),
@@ -177,8 +180,10 @@ def _model(made: Made) -> str:
     arm = []
     for k in range(1, made.joints + 1):
         above = round(SHOULDER * made.radius, 5) if k == 1 else link
+        axis = AXES[made.axes[k - 1]] if made.axes else AXES["y"]
         arm.append(
-            f'<body name="link_{k}" pos="0 0 -{above}"><joint name="alpha_{k}" {about}/>'
+            f'<body name="link_{k}" pos="0 0 -{above}">'
+            f'<joint name="alpha_{k}" axis="{axis}" {about}/>'
             f'<geom class="arm_link" type="capsule" fromto="0 0 -{0.1 * link:.4f} 0 0 '
             f'-{0.9 * link:.4f}" size="{0.08 * link:.5f}" '
             f'mass="{made.arm * made.mass / made.joints:.6g}"/>'
