@@ -23,6 +23,7 @@ from uam_sim_bridge.plant.effects.joint_gear import Gear, gear_step, rigid_step
 from uam_sim_bridge.plant.effects.mocap_dropouts import drop
 from uam_sim_bridge.plant.effects.mocap_jitter import jitter
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
+from uam_sim_bridge.plant.effects.odometry_drift import express, jump
 from uam_sim_bridge.plant.effects.propeller_vibration import Shaken, mean_of_wave, vibrate
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -68,9 +69,10 @@ def same(a, b):
 # Presets
 
 
-def test_calm_has_no_effects_and_laboratory_has_all():
+def test_calm_has_no_effects_and_laboratory_has_all_but_an_odometry():
     assert presets.read() == presets.read(["calm"]) == {}
-    assert set(presets.read(["laboratory"])) == set(EFFECTS)
+    assert set(presets.read(["laboratory"])) == set(EFFECTS) - {"odometry_drift"}
+    assert set(presets.read(["odometry"])) == {"odometry_drift", "mocap_feed"}
 
 
 def test_every_effect_names_its_source_and_describes_its_numbers():
@@ -493,20 +495,51 @@ def test_dropouts_lose_their_share_and_bursts():
 @pytest.mark.parametrize("rate", [30.0, 60.0, 360.0])
 def test_the_motion_capture_has_another_rate_and_delay(rate):
     feed = f"mocap_feed:rate={rate},position_noise=0,attitude_noise=0,latency=0.02"
-    one, found, places = plant(feed), {}, []
+    one, found, places = plant(feed), [], []
     for k in range(250):
-        sample = one.sense().mocap
+        found += [(k, pose) for pose in one.sense().poses]
         places.append(one.truth().state[0, :3])
         one.step(np.full(4, 0.7), np.zeros(2), False)
-        if sample is not None:
-            found[k] = sample
-    stamps = np.array([pose[0] for pose in found.values()])
-    assert len(stamps) == pytest.approx(min(rate, 250.0) * 0.98, abs=2)
-    assert np.all(np.diff(stamps) > 0.0)
-    for k, (stamp, place, _) in found.items():
+    stamps = np.array([pose[0] for _, pose in found])
+    assert len(stamps) == pytest.approx(rate * 0.98, abs=2)  # several in a tick
+    assert np.diff(stamps) == pytest.approx(1.0 / rate, abs=2.1e-3 if rate < 250.0 else 1e-6)
+    for k, (stamp, place, _) in found:
         assert 0.02 - 1e-9 <= 0.004 * k - stamp < 0.024
         path = [np.interp(stamp, 0.004 * np.arange(250), axis) for axis in np.array(places).T]
         assert place == pytest.approx(path, abs=5e-5)  # of its own time, also between two ticks
+
+
+def test_the_frame_of_an_odometry_by_hand():
+    """A quarter turn and a shift; a jump of 0.5 m along y; one that would lead on goes back."""
+    frame = np.array([1.0, 2.0, 3.0, math.pi / 2.0])
+    position, quaternion = np.array([1.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.0, 0.0])
+    express(frame, position, quaternion)
+    assert position == pytest.approx([1.0, 3.0, 3.5])
+    assert quaternion == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
+    frame = np.zeros(4)
+    jump(frame, np.array([0.0, 7.0, 0.0, 1.0]), 0.5, 0.1)
+    assert frame == pytest.approx([0.0, 0.5, 0.0, -0.1])
+    jump(frame, np.array([0.0, 1.0, 0.0, 1.0]), 0.4, 0.1)
+    assert frame == pytest.approx([0.0, 0.1, 0.0, 0.0])
+
+
+def test_an_odometry_drifts_and_jumps_as_often_as_said():
+    one = plant("odometry_drift:walk=0,turn=0,jumps=0.9,jump=0.3,jump_turn=0")
+    acting, drift = one.effects.acting["odometry_drift"], []
+    for _ in range(2400):  # 20 s at 120 Hz
+        one.effects.draw()
+        acting.STEPS["pose"](acting.arrays)
+        drift.append(acting.arrays.frame[:3].copy())
+    ways = np.linalg.norm(np.diff(drift, axis=0), axis=1)
+    assert 8 <= np.count_nonzero(ways) <= 30 and ways[ways > 0.0] == pytest.approx(0.3)
+    one = plant("odometry_drift:walk=0.1,turn=0,jumps=0,jump=0,jump_turn=0")
+    acting, drift = one.effects.acting["odometry_drift"], []
+    for _ in range(12000):
+        one.effects.draw()
+        acting.STEPS["pose"](acting.arrays)
+        drift.append(acting.arrays.frame[:3].copy())
+    seconds = np.diff(drift[::120], axis=0)
+    assert np.std(seconds) == pytest.approx(0.1, rel=0.2)
 
 
 # An effect of a user's own, in Python

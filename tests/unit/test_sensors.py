@@ -152,7 +152,7 @@ def test_a_sample_may_be_later_than_usual_and_none_overtakes_it():
     assert [line(*one) for one in given] == [None, None, None, ("a",), ("b",)]
 
 
-def test_a_pose_may_be_later_than_usual_and_of_several_in_a_tick_the_newest_counts():
+def test_a_pose_may_be_later_than_usual_and_several_arrive_in_their_order():
     mocap, got = rig(), []
     for tick, late in enumerate((3, 0, None, None, None, None)):
         assert due(mocap, float(tick))
@@ -160,10 +160,10 @@ def test_a_pose_may_be_later_than_usual_and_of_several_in_a_tick_the_newest_coun
             send_pose(mocap.arrays, VEHICLE_POSE, tick + 2 + late)
         receive_poses(mocap.arrays, tick)
         got.append(mocap.arrived(VEHICLE_POSE))
-    assert [one and one[0] for one in got] == [None] * 5 + [1.0]
-    assert mocap.arrived(PAYLOAD_POSE) is None
+    assert [[pose[0] for pose in poses] for poses in got] == [[]] * 5 + [[0.0, 1.0]]
+    assert mocap.arrived(PAYLOAD_POSE) == []
     receive_poses(mocap.arrays, 6)
-    assert mocap.arrived(VEHICLE_POSE) is None
+    assert mocap.arrived(VEHICLE_POSE) == []
 
 
 def test_the_pose_of_the_payload_is_that_of_its_grip_point():
@@ -171,7 +171,7 @@ def test_the_pose_of_the_payload_is_that_of_its_grip_point():
     assert due(mocap, 0.0)
     send_pose(mocap.arrays, PAYLOAD_POSE, 0)
     receive_poses(mocap.arrays, 0)
-    _, position, _ = mocap.arrived(PAYLOAD_POSE)
+    ((_, position, _),) = mocap.arrived(PAYLOAD_POSE)
     np.testing.assert_array_equal(position, [1.5, 3.0, 6.5])  # noise 1, 2, 3, halved
 
 

@@ -113,7 +113,8 @@ def test_what_the_model_is_made_of():
         ((("control_period",), 0.02), "control_period: 0.02 s is above 0.008 s"),
         ((("control_period",), 0.01), "control_period: 0.01 s is above 0.008 s"),
         ((("air", "drag"), [0.1]), "air.drag: a list of 3 numbers expected"),
-        ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 is not above 0"),
+        ((("sensors", "mocap", "rate"), 361), "sensors.mocap.rate: 361 Hz; allowed: 30 to 360 Hz"),
+        ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 Hz; allowed: 30 to 360 Hz"),
         (
             (("sensors", "imu", "latency_ticks"), 1.5),
             "latency_ticks: a whole number expected, 0, 1, .., got 1.5",

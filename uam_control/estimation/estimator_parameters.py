@@ -6,9 +6,21 @@ from dataclasses import dataclass
 
 from uam_control.estimation.base import BaseParameters
 from uam_control.estimation.pose_filter import allowed_bandwidth
-from uam_control.settings.parameter_set import choice, number
+from uam_control.settings.parameter_set import ParameterSet, choice, number
 
 REPORTED, OBSERVER = "reported", "observer"  # where the velocity of a joint comes from
+MOCAP, ODOMETRY = "mocap", "odometry"  # where the poses come from
+
+
+@dataclass(frozen=True)
+class PoseSourceParameters(ParameterSet):
+    """Source of the poses, of all nodes that read them; fixed once the node runs."""
+
+    pose_source: str = choice(
+        MOCAP,
+        "poses of a motion capture, or of an odometry (odometry/in), whose jumps are taken out",
+        (MOCAP, ODOMETRY),
+    )
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 from sensor_msgs.msg import BatteryState, Temperature
 
+from uam_control.nodes.pose_source import PoseSource
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
@@ -31,7 +32,8 @@ class MissionInputs:
         self._names = list(joints)
         self._node = node
         self._supervisor, self._inputs = supervisor, supervisor.inputs
-        self._keep(topics.MOCAP, self._on_mocap)
+        self._poses = PoseSource(node)
+        self._keep(self._poses.topic, self._on_mocap)
         self._keep(topics.PAYLOAD, self._on_payload)
         self._keep(topics.THRUST, self._on_thrust, stamp_of)
         self._keep(topics.IMU_BIAS, self._on_imu_bias, stamp_of)
@@ -58,8 +60,10 @@ class MissionInputs:
 
         inlet = self._node.listen(topic, handle, required=False)
 
-    def _on_mocap(self, data: bytes) -> None:
-        self._supervisor.mocap(*read_pose(data))  # refuses a pose that the estimator cannot use
+    def _on_mocap(self, message: Any) -> None:
+        self._supervisor.mocap(
+            *self._poses.read(message)
+        )  # refuses a pose that the estimator cannot use
 
     def _on_payload(self, data: bytes) -> None:
         self._supervisor.payload(*read_pose(data))

@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,13 +12,14 @@ from uam_control.coordinates import CHI
 from uam_control.estimation import catalogue
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.nodes.described import described_hand, described_vehicle
+from uam_control.nodes.pose_source import PoseSource
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage, estimator_stage
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints, read_pose
+from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints
 from uam_msgs_py.messages.navigation import hand_message, odometry_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -74,7 +75,8 @@ class StateEstimatorNode(UamNode):
         rate = NodeParameters(self, OdometryParameters, read_only=True).current.odometry_rate
         self._odometry_period = round(SECOND / rate)  # [ns]
         self._odometry_at = 0  # [ns] stamp of the last odometry
-        self._mocap = self.listen(topics.MOCAP, self._on_mocap)
+        self.poses = PoseSource(self)
+        self._mocap = self.listen(self.poses.topic, self._on_mocap)
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
@@ -86,8 +88,8 @@ class StateEstimatorNode(UamNode):
     def _new_stage(self) -> EstimatorStage:
         return estimator_stage(self.parameter_set.current, len(self._names), self._period)
 
-    def _on_mocap(self, data: bytes) -> None:
-        stamp, position, quaternion = read_pose(data)
+    def _on_mocap(self, message: Any) -> None:
+        stamp, position, quaternion = self.poses.read(message)
         self.note_pose(stamp)
         self.stage.mocap(stamp, position, quaternion)
 
@@ -184,8 +186,11 @@ class StateEstimatorNode(UamNode):
         age.restart()
         if self.stage.held_back:
             return ERROR, DIVERGED, values
+        jumped = self.poses.news()
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values
+        if jumped:
+            return WARN, jumped, values
         if gaps.size and (lines := self.parameter_set.current.capped(np.median(gaps) / SECOND)):
             return WARN, "; ".join(lines), values
         return OK, "running", values

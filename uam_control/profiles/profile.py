@@ -57,16 +57,16 @@ PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
     *("autopilot", "gcs", "vehicle", "dry_run", "network_delay", "publishers"),
-    *("imu_source", "imu_clock"),
+    *("imu_source", "imu_clock", "pose_source"),
     *PROCESS,
 )
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers", *PROCESS)),
-    ESTIMATOR: ("vehicle", "odometry_rate", "publishers", *PROCESS),
+    ESTIMATOR: ("vehicle", "odometry_rate", "pose_source", "publishers", *PROCESS),
     MISSION: (
-        *("control_period", "scenario", "vehicle", "publishers", "state_timeout", *PROCESS),
-        *StartParameters.specs(),
+        *("control_period", "scenario", "vehicle", "pose_source", "publishers", "state_timeout"),
+        *(*PROCESS, *StartParameters.specs()),
         *ScenarioOptions.specs(),
     ),
 }

@@ -15,6 +15,7 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ALPHA, ARM, POSITION
 from uam_control.estimation.estimator import write_biases
+from uam_control.estimation.pose_anchor import PoseAnchor, anchor
 from uam_control.maths.compiled import borrowing, counts_references
 from uam_control.maths.memory import put
 from uam_control.mission import Mission, Scenario, StartParameters
@@ -34,7 +35,7 @@ from uam_control.stages.law_stages import (
     position_step,
 )
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.signals import IMU, JOINTS, MOCAP, PAYLOAD, Imu, Joints, Pose, Signals
+from uam_control.stages.signals import IMU, JOINTS, PAYLOAD, POSES, Imu, Joints, Pose, Signals
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, Stage, Step
 from uam_control.stages.supervisor_inputs import BIAS, GAINS, LIFT, keep, read_inputs
 from uam_control.stages.timing import Timing
@@ -57,9 +58,12 @@ class ControlTick:
         laws: Sequence[LawStage],
         hand: HandStage,
         bridge: BridgeStage,
+        odometry: bool = False,
     ) -> None:
-        """laws: of position, attitude and arm; hand: before that of the arm."""
+        """laws: of position, attitude and arm; hand: before that of the arm; odometry: whether the
+        poses are those of one, whose jumps are taken out in the tick, see `PoseAnchor`."""
         self.stages = list(STAGES)
+        self.anchor, self.odometry = PoseAnchor(), odometry
         self.estimator, self.mission = estimator, mission
         self.hand, self.bridge = hand, bridge
         self.position, self.attitude, self.arm = laws
@@ -87,11 +91,12 @@ class ControlTick:
         bridge: BridgeStage,
         timing: Timing,
         vehicle: VehicleDescription | None = None,
+        odometry: bool = False,
     ) -> Self:
         """Return the tick of a flight that starts by itself.
 
         sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
-        begin of the reference is compared with, if given.
+        begin of the reference is compared with, if given; odometry: see `ControlTick`.
         """
         estimator, joints = sets["state_estimator"], len(scenario.arm_start)
         start = StartParameters(auto_start=True)
@@ -107,6 +112,7 @@ class ControlTick:
             [LawStage(controller, timing) for controller in controllers],
             HandStage(sets["arm_controller"], timing.control_period, joints, vehicle),
             bridge,
+            odometry,
         )
 
     def tick(
@@ -122,7 +128,8 @@ class ControlTick:
         are stored, the other signals do not change.
         """
         signals = self.signals
-        signals.mocap, signals.joints, signals.imu = mocap, joints, imu
+        signals.poses = () if mocap is None else (mocap,)
+        signals.joints, signals.imu = joints, imu
         signals.payload = payload
         return self.go_on(0)
 
@@ -142,11 +149,13 @@ class ControlTick:
 
 
 def listen(tick: ControlTick) -> bool:
-    """mocap, joints, payload → the supervisor's inputs; mocap → the autopilot's estimator."""
+    """poses, joints, payload → the supervisor's inputs; poses → the autopilot's estimator."""
     s, inputs = tick.signals, tick.mission.inputs
-    if s.mocap is not None:
-        inputs.put(supervisor_inputs.MOCAP, *s.mocap)
-        tick.bridge.mocap(*s.mocap)
+    if tick.odometry:
+        s.poses = [(stamp, *tick.anchor(stamp / SECOND, *pose)) for stamp, *pose in s.poses]
+    for pose in s.poses:
+        inputs.put(supervisor_inputs.MOCAP, *pose)
+        tick.bridge.mocap(*pose)
     if s.joints is not None:
         inputs.put(supervisor_inputs.JOINTS, s.joints[0], s.joints[3])
     if s.payload is not None:
@@ -155,10 +164,10 @@ def listen(tick: ControlTick) -> bool:
 
 
 def estimate(tick: ControlTick) -> bool:
-    """mocap, joints, imu → state."""
+    """poses, joints, imu → state."""
     s, estimator = tick.signals, tick.estimator
-    if s.mocap is not None:
-        estimator.mocap(*s.mocap)
+    for pose in s.poses:
+        estimator.mocap(*pose)
     if s.joints is not None:
         estimator.joints(*s.joints[:3])
     state = None if s.imu is None else estimator.imu(*s.imu)
@@ -271,14 +280,18 @@ def look_ahead(tick: ControlTick) -> bool:
 @borrowing
 def listen_step(a: tuple) -> int:
     """See `listen`, of an armed vehicle."""
-    s, vision, seen, inputs = a
-    stamp = s.stamps[MOCAP]
-    if stamp >= 0:
+    s, vision, seen, inputs, anchored, odometry = a
+    for i in range(POSES):
+        stamp, pose = s.exposed[i], s.poses[i]
+        if stamp < 0:
+            break
         exposed = stamp / SECOND
-        if take_pose(vision, exposed, s.pose[:3], s.pose[3:], True):
+        if odometry:
+            anchor(anchored, exposed, pose)
+        if take_pose(vision, exposed, pose[:3], pose[3:], True):
             seen[0] = exposed
-            put(s.pose[3:], seen[1:])
-        keep(inputs, supervisor_inputs.MOCAP, stamp, s.pose)
+            put(pose[3:], seen[1:])
+        keep(inputs, supervisor_inputs.MOCAP, stamp, pose)
     if s.stamps[JOINTS] >= 0:
         keep(inputs, supervisor_inputs.JOINTS, s.stamps[JOINTS], s.joints[2])
     if s.stamps[PAYLOAD] >= 0:
@@ -290,8 +303,11 @@ def listen_step(a: tuple) -> int:
 def estimate_step(a: tuple) -> int:
     """See `estimate`."""
     s, estimator, biases = a
-    if s.stamps[MOCAP] >= 0:
-        estimator_stage.take_pose(estimator, s.stamps[MOCAP], s.pose[:3], s.pose[3:])
+    for i in range(POSES):
+        stamp, pose = s.exposed[i], s.poses[i]
+        if stamp < 0:
+            break
+        estimator_stage.take_pose(estimator, stamp, pose[:3], pose[3:])
     if s.stamps[JOINTS] >= 0:
         estimator_stage.take_readings(estimator, s.stamps[JOINTS], s.joints[0], s.joints[1])
     stamp = s.stamps[IMU]
@@ -360,8 +376,12 @@ def _bridge_step(tick: ControlTick) -> Step | None:
     return Step(sending(port.steps), arrays)
 
 
-def _heard(tick: ControlTick) -> tuple:
-    return tick.bridge.vision.arrays, tick.bridge.source.seen, tick.mission.inputs.arrays
+def _listen_step(tick: ControlTick) -> Step | None:
+    if tick.odometry and type(tick.estimator) is not EstimatorStage:
+        return None  # a stage in Python has the poses of the stage before it in Python
+    bridge, inputs = tick.bridge, tick.mission.inputs
+    arrays = bridge.vision.arrays, bridge.source.seen, inputs.arrays, tick.anchor.arrays
+    return Step(listen_step, (tick.arrays, *arrays, tick.odometry))
 
 
 def _estimate_step(tick: ControlTick) -> Step | None:
@@ -384,7 +404,7 @@ def _ahead(tick: ControlTick) -> tuple:
 
 
 STAGES: Sequence[Stage] = (
-    Stage("listeners of the sensors", listen, _step(listen_step, _heard)),
+    Stage("listeners of the sensors", listen, _listen_step),
     Stage("estimator", estimate, _estimate_step, decides=False),
     Stage("mission", fly_mission, _step(mission_step, _flown)),
     Stage("position law", control_position, _law_step(position_step, "position"), decides=False),

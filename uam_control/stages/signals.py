@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -14,19 +15,22 @@ from uam_control.setpoints.setpoint_source import Setpoint
 Pose = tuple[int, np.ndarray, np.ndarray]  # stamp [ns], position (3,) [m], quaternion [w x y z]
 Joints = tuple[int, np.ndarray, np.ndarray, np.ndarray]  # stamp, angles, speeds, efforts (n,)
 Imu = tuple[int, np.ndarray, np.ndarray]  # stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]
-MOCAP, JOINTS, IMU, PAYLOAD = range(4)  # sensors
+JOINTS, IMU, PAYLOAD = range(3)  # sensors, of which a sample at most arrives at a tick
 NOTHING = -1  # stamp of a sample that has not arrived
+POSES = 8  # that arrive at a tick, at most
 
 
 class SignalArrays(NamedTuple):
     """What compiled stages have of the `Signals`.
 
-    stamps (4,) [ns]: of the sensors' samples; pose (7,): position and quaternion; joints (3, n);
+    exposed (POSES,) [ns], poses (POSES, 7): stamps, positions and quaternions, in order of the
+    stamps, NOTHING behind the last; stamps (3,) [ns]: of the other sensors' samples; joints (3, n);
     imu (2, 3); payload (3,): position. numbers (1,): stamp [ns], time [s].
     """
 
+    exposed: np.ndarray
+    poses: np.ndarray
     stamps: np.ndarray
-    pose: np.ndarray
     joints: np.ndarray
     imu: np.ndarray
     payload: np.ndarray
@@ -58,7 +62,7 @@ class Signals:
     tau_q: np.ndarray  # (3,) [N m, FLU]
     memory: np.ndarray
     # samples that arrived at this tick
-    mocap: Pose | None = None
+    poses: Sequence[Pose] = ()  # of the vehicle, in order of their stamps
     joints: Joints | None = None
     imu: Imu | None = None
     payload: Pose | None = None
@@ -93,17 +97,19 @@ class Signals:
         """Return new arrays for samples, and those of the signals."""
         n = self.state.shape[1] - ALPHA
         return SignalArrays(
-            *(np.full(4, NOTHING), np.zeros(7), np.zeros((3, n)), np.zeros((2, 3)), np.zeros(3)),
+            *(np.full(POSES, NOTHING), np.zeros((POSES, 7)), np.full(3, NOTHING)),
+            *(np.zeros((3, n)), np.zeros((2, 3)), np.zeros(3)),
             *(self.state, self.reference, self.attitude_reference, self.tau_p, self.tau_q),
             self.memory,
         )
 
     def put(self, a: SignalArrays) -> None:
         """Copy the samples into the arrays for compiled stages."""
-        samples = self.mocap, self.joints, self.imu, self.payload
+        samples = self.joints, self.imu, self.payload
         a.stamps[:] = [NOTHING if sample is None else sample[0] for sample in samples]
-        if self.mocap is not None:
-            a.pose[:3], a.pose[3:] = self.mocap[1:]
+        a.exposed[:] = NOTHING
+        for i, (stamp, position, quaternion) in enumerate(self.poses[-POSES:]):
+            a.exposed[i], a.poses[i, :3], a.poses[i, 3:] = stamp, position, quaternion
         if self.joints is not None:
             a.joints[:] = self.joints[1:]
         if self.imu is not None:

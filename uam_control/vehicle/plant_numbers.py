@@ -13,6 +13,8 @@ NOT_OF_THE_PLANT = (
     *("rotors.layout", "rotors.radius", "rotors.moment_ratio", "servos.effort_limit"),
 )
 
+LEAST_RATE, LARGEST_RATE = 30.0, 360.0  # [Hz] of poses with which the estimator is made to fly
+
 
 def check_plant_numbers(top: Section, servos: list[Section]) -> None:
     """Raise the section's error if an entry that only plant or drivers read is not usable.
@@ -27,7 +29,10 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
     sensors = top.section("sensors")
     sensors.not_negative("noise_scale")
     mocap, imu, joints = (sensors.section(name) for name in ("mocap", "imu", "joints"))
-    mocap.positive("rate")
+    rate = mocap.number("rate")
+    if not LEAST_RATE <= rate <= LARGEST_RATE:
+        allowed = f"{LEAST_RATE:g} to {LARGEST_RATE:g} Hz"
+        raise mocap.error("rate", f"{rate:g} Hz; allowed: {allowed}")
     joints.positive("counts_per_turn")
     joints.positive("velocity_unit")
     for name in ("position_noise", "attitude_noise"):

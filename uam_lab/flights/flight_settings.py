@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import (
@@ -52,6 +53,7 @@ from uam_sim_bridge.mavlink.hil.hil_server import open_only_here
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4 import px4_parameters
@@ -120,6 +122,12 @@ class FlightSettings:
     def layout(self) -> str:
         """Return the layout of the control nodes, for the records of the flight."""
         return LAYOUTS[self.fused]
+
+    @property
+    def pose_source(self) -> str:
+        """Return where the poses come from, as the nodes' parameter."""
+        effects = self.vehicle_changes.get("effects", {})
+        return ODOMETRY if OdometryDrift.NAME in effects else MOCAP
 
     @property
     def foreign(self) -> tuple[str, ...]:

@@ -36,6 +36,13 @@ CONTENTS = {
     topics.IMU: Content(BODY, "rad/s, m/s²", TICK),
     topics.JOINTS: Content(JOINT_SPACE, "rad, rad/s, N m", TICK),
     topics.MOCAP: Content(WORLD, "m, quaternion", MOCAP),
+    topics.ODOMETRY_IN: Content(
+        "world, map or odom",
+        "m, quaternion",
+        "30 to 360 Hz",
+        "mujoco_sim or your driver",
+        "state_estimator, mission, mavlink_bridge",
+    ),
     topics.PAYLOAD: Content(WORLD, "m, quaternion", MOCAP),
     topics.STATE: Content(WORLD, CHI_UNITS, TICK),
     topics.REFERENCE: Content(WORLD, CHI_UNITS, TICK),

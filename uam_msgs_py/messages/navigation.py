@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -19,9 +20,13 @@ from uam_control.maths.rotations import (
     rotate_back,
 )
 from uam_control.stamps import SECOND
-from uam_msgs_py.messages.layouts import STAMP
-from uam_msgs_py.messages.ros_time import set_stamp
+from uam_msgs_py.messages.layouts import STAMP, BadMessage
+from uam_msgs_py.messages.ros_time import nanoseconds, set_stamp
 from uam_msgs_py.messages.topics import BODY, WORLD
+
+FRAMES = (WORLD, "map", "odom")  # of an odometry that is read, REP 105
+# m, rad: a pose whose covariance says more is of an odometry that has lost its way
+LARGEST_DEVIATION = 0.25
 
 
 def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odometry:
@@ -50,6 +55,51 @@ def hand_message(stamp: int, chain: Chain, chi: np.ndarray) -> PoseStamped:
     at.x, at.y, at.z = place
     turned.w, turned.x, turned.y, turned.z = quaternion_from_matrix(np.array(turn)).tolist()
     return message
+
+
+class OdometryWriter:
+    """Writes the poses of an odometry, without twist and covariance."""
+
+    def __init__(self, frame: str = BODY):
+        """frame: of the body."""
+        self._message = Odometry(child_frame_id=frame)
+        self._message.header.frame_id = "odom"
+
+    def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> bytes:
+        """Return the message; position (3,) [m], quaternion (4,) body → its frame [w x y z]."""
+        set_stamp(self._message.header.stamp, stamp)
+        at, turn = self._message.pose.pose.position, self._message.pose.pose.orientation
+        at.x, at.y, at.z = position.tolist()
+        turn.w, turn.x, turn.y, turn.z = quaternion.tolist()
+        return serialize_message(self._message)
+
+
+def read_odometry(message: Odometry, frame: str = BODY) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return (stamp [ns], position (3,) [m], unit quaternion (4,) body → its frame [w x y z]).
+
+    frame: of the body. The twist is not used. Raises BadMessage for another frame, numbers that are
+    not finite, a quaternion whose norm is not 1, or a deviation above LARGEST_DEVIATION; a variance
+    that is not finite and positive is unknown.
+    """
+    found, child = message.header.frame_id, message.child_frame_id
+    if found not in FRAMES:
+        raise BadMessage(f"frame '{found}', expected {', '.join(FRAMES)}")
+    if child not in (frame, BODY):
+        raise BadMessage(f"child_frame_id '{child}', expected '{frame}'")
+    at, turn = message.pose.pose.position, message.pose.pose.orientation
+    position = np.array([at.x, at.y, at.z])
+    quaternion = np.array([turn.w, turn.x, turn.y, turn.z])
+    if not np.isfinite(position).all():
+        raise BadMessage(f"position {position.tolist()} is not finite")
+    norm = math.sqrt(quaternion @ quaternion)
+    if not abs(norm - 1.0) < 0.01:
+        raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
+    variances = np.asarray(message.pose.covariance)[::7]
+    known = variances[np.isfinite(variances) & (variances > 0.0)]
+    if known.size and (deviation := math.sqrt(known.max())) > LARGEST_DEVIATION:
+        allowed = f"at most {LARGEST_DEVIATION} is used"
+        raise BadMessage(f"covariance: deviation {deviation:.3g} m or rad, {allowed}")
+    return nanoseconds(message.header.stamp), position, quaternion / norm
 
 
 def path_message(stamp: int, times: np.ndarray, chi: np.ndarray) -> bytes:

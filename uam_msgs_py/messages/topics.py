@@ -85,6 +85,13 @@ CLOCK = Topic("clock", Clock, _qos(1, reliable=False), "simulation time")
 IMU = Topic("imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
 JOINTS = Topic("joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
 MOCAP = Topic("vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
+ODOMETRY_IN = Topic(
+    "odometry/in",
+    Odometry,
+    SENSOR_DATA,
+    "poses of an odometry in place of the motion capture (`pose_source: odometry`); 30 to 360 Hz",
+    one_publisher=False,
+)
 PAYLOAD = Topic(
     "vrpn_mocap/payload/pose",
     PoseStamped,

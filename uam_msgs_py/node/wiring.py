@@ -121,6 +121,12 @@ def with_autopilot_imu(wires: Sequence[Wire]) -> Sequence[Wire]:
     return [replace(wire, **changed.get(wire.topic, {})) for wire in wires]
 
 
+def with_odometry(wires: Sequence[Wire]) -> Sequence[Wire]:
+    """Return `wires` for a flight whose poses are those of an odometry."""
+    changed = {topics.MOCAP: {"topic": topics.ODOMETRY_IN}}
+    return [replace(wire, **changed.get(wire.topic, {})) for wire in wires]
+
+
 def on_vehicle(publishers: Mapping[str, str], subscribers: Mapping[str, str]) -> list[Wire]:
     """Return WIRES of a vehicle, on which devices stand in place of the plant.
 

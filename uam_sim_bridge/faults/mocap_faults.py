@@ -24,8 +24,8 @@ class PoseFault(PlantFault):
         raise NotImplementedError
 
     def sense(self, samples: Samples, now: Occurrence) -> None:
-        if samples.mocap is not None:
-            samples.mocap = self.altered(samples.mocap, now)
+        altered = [self.altered(pose, now) for pose in samples.poses]
+        samples.poses = [pose for pose in altered if pose is not None]
 
 
 class MocapDropout(PoseFault):
@@ -86,11 +86,14 @@ class MocapLatency(PlantFault):
         time, waiting = samples.hil[0], now.memory
         if waiting is None:
             waiting = now.memory = deque()  # time [s] at which it arrives, pose
-        if samples.mocap is not None:
+        taken, arrived = samples.poses, []
+        for pose in taken:
             late = self.delay + (now.noise.uniform(0.0, self.jitter) if self.jitter else 0.0)
-            waiting.append((time + late, samples.mocap))
-        due = waiting and waiting[0][0] <= time + 1e-9
-        samples.mocap = waiting.popleft()[1] if due else None
+            waiting.append((time + late, pose))
+        # as many as are taken, one at least: a burst comes one after the other
+        while waiting and waiting[0][0] <= time + 1e-9 and len(arrived) < max(1, len(taken)):
+            arrived.append(waiting.popleft()[1])
+        samples.poses = arrived
 
 
 class MocapOutliers(PoseFault):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from uam_control.ages import STALE
+from uam_control.estimation.estimator_parameters import PoseSourceParameters
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.sequence import OffboardParameters
 from uam_control.profiles.profile import BRIDGE, Profile
@@ -110,6 +111,7 @@ KINDS: tuple[type[ParameterSet], ...] = (
     *(BridgeParameters, OffboardParameters, VisionParameters, HoldParameters),
     *(RateThrustParameters, SetpointParameters, ThrustIdentificationParameters),
     *(AutopilotMagnetParameters, SwitchingParameters, ProcessParameters, TickTimesParameters),
+    PoseSourceParameters,
 )
 EVERY_NODE = ("vehicle", "publishers", "use_sim_time")
 NAMES = {*EVERY_NODE, *(name for kind in KINDS for name in kind.specs())}

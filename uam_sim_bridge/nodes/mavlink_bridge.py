@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -23,6 +24,7 @@ from std_srvs.srv import Trigger
 
 from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.nodes.described import described_vehicle
+from uam_control.nodes.pose_source import PoseSource
 from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_control.setpoints.kinds.catalogue import SETPOINTS, SetpointParameters
 from uam_control.setpoints.kinds.desired import Desired
@@ -46,7 +48,7 @@ from uam_msgs_py.messages.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter, read_pose
+from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.status import ERROR, OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
@@ -138,7 +140,8 @@ class MavlinkBridgeNode(UamNode):
         self._join = StampJoin(names, self._tick)
         self.joins.append(self._join)
         self._arming = self.listen(topics.ARMING, self._on_arming, required=False)
-        self._mocap = self.listen(topics.MOCAP, self._on_mocap)
+        self._poses = PoseSource(self)
+        self._mocap = self.listen(self._poses.topic, self._on_mocap)
         self._mission = self.listen(topics.MISSION_STATUS, self._on_mission, required=False)
         self._feed(topics.STATE, self._read_state)
         self._feed(topics.POSITION_COMMAND, read_position_command)
@@ -216,8 +219,8 @@ class MavlinkBridgeNode(UamNode):
         self.get_logger().warning(f"command kill: {response.message}")
         return response
 
-    def _on_mocap(self, data: bytes) -> None:
-        self.stage.mocap(*read_pose(data))
+    def _on_mocap(self, message: Any) -> None:
+        self.stage.mocap(*self._poses.read(message))
 
     def _tick(
         self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad

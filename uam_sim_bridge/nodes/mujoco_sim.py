@@ -69,6 +69,7 @@ from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import PhysicsError, Plant, Vehicle
 from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 
 NAME = "mujoco_sim"
 RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"
@@ -116,7 +117,9 @@ class Simulator:
         node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
         self._times = tick_times(declared.tick_times)
-        self.sensors = Sensors(node, described, options.publish_imu, self._times)
+        self._odometry = OdometryDrift.NAME in vehicle.numbers["effects"]
+        sensors = node, described, options.publish_imu, self._times, self._odometry
+        self.sensors = Sensors(*sensors)
         self.truth = TruthTopics(node, described)
         servo_mode = vehicle.numbers["servos"]["mode"]
         self.answers = Answers(node, described, declared.rightful, servo_mode)
@@ -224,6 +227,8 @@ class Simulator:
         wires = wiring.with_foreign(self.node, self._own_names)
         if not self.options.publish_imu:
             wires = wiring.with_autopilot_imu(wires)
+        if self._odometry:
+            wires = wiring.with_odometry(wires)
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
             outlets = self.sensors.outlets | self.truth.outlets

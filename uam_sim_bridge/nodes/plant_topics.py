@@ -24,6 +24,7 @@ from uam_msgs_py.messages.convert import (
     read_switch,
 )
 from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.navigation import OdometryWriter
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -58,15 +59,24 @@ class Sensors(Outlets):
     """Publishes /clock and the sensor samples."""
 
     def __init__(
-        self, node: Node, vehicle: VehicleDescription, publish_imu: bool, times: NoTickTimes
+        self,
+        node: Node,
+        vehicle: VehicleDescription,
+        publish_imu: bool,
+        times: NoTickTimes,
+        odometry: bool = False,
     ):
-        """publish_imu: whether the companion has an IMU of its own; times: see Outlets."""
+        """publish_imu: whether the companion has an IMU of its own; times: see Outlets; odometry:
+        whether the poses are those of one."""
         imu = (topics.IMU,) if publish_imu else ()
-        chosen = topics.CLOCK, topics.JOINTS, topics.MOCAP, topics.PAYLOAD, *imu
+        poses = topics.ODOMETRY_IN if odometry else topics.MOCAP
+        chosen = topics.CLOCK, topics.JOINTS, poses, topics.PAYLOAD, *imu
         super().__init__(node, chosen, times)
         self._clock, self._joints, self._mocap, self._payload, *self._imu = self.outlets.values()
         self._clock_writer = Template(Clock())
-        self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()
+        body = frame(node, topics.BODY)
+        self._imu_writer = ImuWriter(body)
+        self._mocap_writer = OdometryWriter(body) if odometry else PoseWriter()
         self._payload_writer = PoseWriter()
         self._joint_writer = JointStateWriter(vehicle.joint_names)
         self._period = nanoseconds(vehicle.control_period)
@@ -83,9 +93,8 @@ class Sensors(Outlets):
         The IMU's is published last: it starts the estimator's tick. The stamp of the tick is the
         IMU's without jitter, a multiple of the control period.
         """
-        if samples.mocap is not None:
-            time, position, quaternion = samples.mocap
-            self._mocap.publish(self._mocap_writer.fill(nanoseconds(time), position, quaternion))
+        for exposed, *pose in samples.poses:
+            self._mocap.publish(self._mocap_writer.fill(nanoseconds(exposed), *pose))
         if samples.payload is not None:
             time, *pose = samples.payload
             self._payload.publish(self._payload_writer.fill(nanoseconds(time), *pose))

@@ -285,8 +285,11 @@ class MujocoPlant(Plant):
         if joints is not None:
             parts = joints[6 : 6 + n], joints[6 + n : 6 + 2 * n], joints[6 + 2 * n :]
             joints = (taken * self.period, *parts)
-        mocap, payload = map(self._mocap.arrived, (VEHICLE_POSE, PAYLOAD_POSE))
-        return Samples(imu, joints, mocap, hil, payload=payload)
+        poses, payloads = map(self._mocap.arrived, (VEHICLE_POSE, PAYLOAD_POSE))
+        payload = payloads[-1] if payloads else None
+        samples = Samples(imu, joints, None, hil, payload=payload)
+        samples.poses = poses
+        return samples
 
     def imu(self, tick: int) -> tuple[float, np.ndarray, np.ndarray] | None:
         """Return stamp [s], gyro and specific force (3,) of the sample taken at `tick`, a copy."""

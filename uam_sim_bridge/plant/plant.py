@@ -39,7 +39,8 @@ class Samples:
     joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
     position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
     the autopilot's own sensors. imu_copies: messages with this IMU sample. payload: as mocap, of
-    the payload's grip point, the middle of its upper side.
+    the payload's grip point, the middle of its upper side. earlier: poses that arrive at the same
+    tick as mocap, in order, exposed before it.
     """
 
     imu: tuple | None
@@ -48,6 +49,16 @@ class Samples:
     hil: tuple
     imu_copies: int = 1
     payload: tuple | None = None
+    earlier: Sequence[tuple] = ()
+
+    @property
+    def poses(self) -> Sequence[tuple]:
+        """All poses of the vehicle, in order."""
+        return () if self.mocap is None else (*self.earlier, self.mocap)
+
+    @poses.setter
+    def poses(self, poses: Sequence[tuple]) -> None:
+        *self.earlier, self.mocap = poses or (None,)
 
 
 def check_arrays(arrays: Sequence[np.ndarray]) -> None:

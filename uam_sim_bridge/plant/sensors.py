@@ -109,7 +109,7 @@ class Imu:
 class MocapArrays(NamedTuple):
     """Of a `Mocap`. taken (2, POSE): newest pose of vehicle and payload, see `take_poses`; due (2,
     WAITING) [ticks] and poses (2, WAITING, POSE): of those that have not arrived, in rings;
-    first, count, arrived (2,): of the rings; arrived: row of the pose of this tick, -1: none.
+    first, count, arrived (2,): of the rings; arrived: how many at this tick, the rows before first.
     grip (3,) [m]: the payload's; numbers (1,): see REAL."""
 
     noise: NoiseArrays
@@ -177,10 +177,11 @@ class Mocap:
         left = min(noise.draw(in_a_tick) for noise in self.noises)
         return max(1, int((left - in_a_tick) * self.period / tick))
 
-    def arrived(self, body: int) -> tuple[float, np.ndarray, np.ndarray] | None:
-        """Return stamp [s], position, quaternion of a pose that arrives at this tick."""
-        row = self.arrays.arrived.item(body)
-        return None if row < 0 else _parts(self.arrays.poses[body, row])
+    def arrived(self, body: int) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Return stamp [s], position, quaternion of the poses that arrive at this tick."""
+        a = self.arrays
+        rows = range(a.first[body] - a.arrived[body], a.first[body])
+        return [_parts(a.poses[body, row % WAITING]) for row in rows]
 
 
 def _parts(pose: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -245,11 +246,11 @@ def send_pose(a: MocapArrays, body: int, due: int) -> None:
 
 @borrowing
 def receive_poses(a: MocapArrays, tick: int) -> None:
-    """Write which poses arrive at `tick`: of several in a tick the newest one counts."""
+    """Write how many poses arrive at `tick`."""
     for body in range(2):
-        a.arrived[body] = -1
+        a.arrived[body] = 0
         while a.count[body] and a.due[body, a.first[body]] <= tick:
-            a.arrived[body] = a.first[body]
+            a.arrived[body] += 1
             a.first[body] = (a.first[body] + 1) % WAITING
             a.count[body] -= 1
 

@@ -28,7 +28,7 @@ from uam_control.maths.memory import put
 from uam_control.stages.bridge_stage import BridgeStage, unreported
 from uam_control.stages.control_tick import ControlTick, take_report
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.signals import IMU, JOINTS, MOCAP, NOTHING, PAYLOAD
+from uam_control.stages.signals import IMU, JOINTS, NOTHING, PAYLOAD, POSES, SignalArrays
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
 from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
@@ -36,7 +36,7 @@ from uam_sim_bridge.plant import PhysicsError, Plant
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.plant_tick import sense, step
-from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE
+from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, MocapArrays
 
 COMPILES = "compiling the direct engine for this law and vehicle (once)"
 LEAST = 2  # ticks for which the preparations are worth their time
@@ -298,20 +298,11 @@ class CompiledTicks:
 def sense_step(arrays: tuple) -> int:
     """Take the samples of a tick, as `DirectFlight.sense`."""
     plant, s, sample, ring, motors, numbers, port = arrays
-    tick, m, mocap = numbers[0], plant.numbers[0], plant.mocap
+    tick, m = numbers[0], plant.numbers[0]
     tick.time = m.tick * m.period
     port[0].time = tick.time
     sense(plant, ring[tick.following % len(ring)][MOTORS + len(motors) :])
-    s.stamps[MOCAP] = NOTHING
-    s.stamps[PAYLOAD] = NOTHING
-    if mocap.arrived[VEHICLE_POSE] >= 0:
-        pose = mocap.poses[VEHICLE_POSE, mocap.arrived[VEHICLE_POSE]]
-        s.stamps[MOCAP] = stamp_of(pose[0])
-        put(pose[1:], s.pose)
-    if mocap.arrived[PAYLOAD_POSE] >= 0:
-        pose = mocap.poses[PAYLOAD_POSE, mocap.arrived[PAYLOAD_POSE]]
-        s.stamps[PAYLOAD] = stamp_of(pose[0])
-        put(pose[1:], s.payload)
+    deliver_poses(plant.mocap, s)
     taken, n = m.tick - m.joints_late, s.joints.shape[1]
     s.stamps[JOINTS] = stamp_of(taken * m.period)
     for i in range(3):
@@ -321,6 +312,23 @@ def sense_step(arrays: tuple) -> int:
     put_imu(plant.samples[taken % len(plant.samples)], s.imu)
     put_imu(plant.samples[m.tick % len(plant.samples)], sample)
     return DONE
+
+
+@borrowing
+def deliver_poses(mocap: MocapArrays, s: SignalArrays) -> None:
+    """Give the stages the poses of a tick: POSES of the vehicle at most, the payload's newest."""
+    count = min(mocap.arrived[VEHICLE_POSE], POSES)
+    for i in range(count):
+        pose = mocap.poses[VEHICLE_POSE, (mocap.first[VEHICLE_POSE] - count + i) % WAITING]
+        s.exposed[i] = stamp_of(pose[0])
+        put(pose[1:], s.poses[i])
+    if count < POSES:
+        s.exposed[count] = NOTHING
+    s.stamps[PAYLOAD] = NOTHING
+    if mocap.arrived[PAYLOAD_POSE]:
+        pose = mocap.poses[PAYLOAD_POSE, (mocap.first[PAYLOAD_POSE] - 1) % WAITING]
+        s.stamps[PAYLOAD] = stamp_of(pose[0])
+        put(pose[1:], s.payload)
 
 
 @borrowing

@@ -27,8 +27,9 @@ from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.nodes.bridge_parameters import check_names
-from uam_sim_bridge.plant import PhysicsError, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
+from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
 
@@ -72,7 +73,10 @@ class DirectFlight:
             BridgeSets.of(described, section), described, self.autopilot, self.sequence
         )
         timing = Timing(self.plant.period)
-        self.control = ControlTick.of(scenario, sets, bridge, timing, described)
+        self.control = ControlTick.of(
+            *(scenario, sets, bridge, timing, described),
+            odometry=OdometryDrift.NAME in vehicle.numbers["effects"],
+        )
         if self._faults:
             self.control.insert("bridge", "faults", self._update_faults, decides=False)
         if self._faults and self._faults.link.timeline.all:
@@ -161,13 +165,13 @@ class DirectFlight:
         samples = plant.observe(recorder.truth())
         before, self.newest = self.newest, samples.hil
         imu = before if self.autopilot_imu else samples.imu
-        self._deliver(samples.mocap, samples.joints, imu, samples.payload)
+        self._deliver(samples, imu)
 
     def resume(self) -> None:
         """Go on after compiled ticks that have sensed last."""
         samples = self.plant.arrived()
         self.newest = samples.hil
-        self._deliver(samples.mocap, samples.joints, samples.imu, samples.payload)
+        self._deliver(samples, samples.imu)
 
     def go_on(self, stage: int) -> None:
         """Finish a tick from a number in `ControlTick.stages` on."""
@@ -187,22 +191,21 @@ class DirectFlight:
         signals = self.control.signals
         self.plant.step(self.autopilot.motors, signals.arm_command, signals.magnet)
 
-    def _deliver(
-        self, mocap: tuple | None, joints: tuple | None, imu: tuple | None, payload: tuple | None
-    ) -> None:
-        """Give samples, see `Samples`, to the stages, with stamps [ns].
+    def _deliver(self, samples: Samples, imu: tuple | None) -> None:
+        """Give samples to the stages, with stamps [ns]; imu: of the estimator.
 
         As the plant's node does, nothing is delivered before every kind of sensor has.
         """
-        signals, samples = self.control.signals, (mocap, joints, imu, payload)
+        signals, joints, poses = self.control.signals, samples.joints, samples.poses
         if not self._complete:
-            self._complete = None not in (mocap, joints, imu)
-            for sample in filter(None, (*samples[:3], self.newest)):
+            self._complete = bool(poses) and None not in (joints, imu)
+            for sample in filter(None, (*poses, joints, imu, self.newest)):
                 check_arrays(sample[1:])
-            if not self._complete:
-                samples = (None,) * 4
-        signals.mocap, signals.joints, signals.imu, signals.payload = (
-            sample and (nanoseconds(sample[0]), *sample[1:]) for sample in samples
+        known, payload = self._complete, samples.payload
+        signals.poses = [_stamped(pose) for pose in poses] if known else ()
+        signals.joints, signals.imu, signals.payload = (
+            _stamped(sample) if known and sample is not None else None
+            for sample in (joints, imu, payload)
         )
 
     def _update_faults(self, control: ControlTick) -> bool:
@@ -210,3 +213,8 @@ class DirectFlight:
         signals = control.signals
         self._faults.update(signals.stamp / SECOND, signals.time, signals.phase)
         return True
+
+
+def _stamped(sample: tuple) -> tuple:
+    """Return a sample with its stamp in [ns] instead of [s]."""
+    return nanoseconds(sample[0]), *sample[1:]

@@ -140,6 +140,8 @@ def flight_nodes(settings: FlightSettings, folder: ResultFolder) -> dict[str, di
         "dry_run": settings.dry_run,
         "imu_source": settings.imu,
     }
+    for node in (wiring.ESTIMATOR, wiring.MISSION, wiring.BRIDGE):
+        sections[node]["pose_source"] = settings.pose_source
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -115,4 +116,5 @@ class ActingEffects:
 
     def draw(self) -> int:
         """Draw the noise that is due; return for how many ticks it lasts."""
-        return min((noise.draw() for noise in self._noises), default=BLOCK)
+        poses = math.ceil(self.bench.period / self.bench.mocap.period)  # in a tick
+        return min((noise.draw(poses) for noise in self._noises), default=BLOCK) // poses

@@ -15,6 +15,7 @@ from uam_sim_bridge.plant.effects.mocap_dropouts import MocapDropouts
 from uam_sim_bridge.plant.effects.mocap_feed import MocapFeed
 from uam_sim_bridge.plant.effects.mocap_jitter import MocapJitter
 from uam_sim_bridge.plant.effects.network_delay import NetworkDelay
+from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 from uam_sim_bridge.plant.effects.propeller_vibration import PropellerVibration
 from uam_sim_bridge.plant.effects.rotor_mismatch import RotorMismatch
 from uam_sim_bridge.plant.effects.rotor_spread import RotorSpread
@@ -41,6 +42,7 @@ KINDS: tuple[type[Effect], ...] = (
     ArmOcclusion,
     MocapJitter,
     MocapDropouts,
+    OdometryDrift,
     NetworkDelay,
 )
 EFFECTS: dict[str, type[Effect]] = {kind.NAME: kind for kind in KINDS}

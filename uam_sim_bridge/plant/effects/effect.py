@@ -107,8 +107,8 @@ class Acting:
     """An effect in a flight, compiled or in Python.
 
     STEPS: compiled functions of the one tuple `arrays`, which return 0, by the names of HOOKS;
-    noises: of which a tick uses at most one row each. In Python a subclass implements some of the
-    methods instead.
+    noises: of which a tick or a pose uses at most one row each. In Python a subclass implements
+    some of the methods instead.
     """
 
     STEPS: ClassVar[Mapping[str, Callable[[tuple], int]]] = {}

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from uam_control.vehicle.plant_numbers import LARGEST_RATE, LEAST_RATE
 from uam_sim_bridge.plant.effects.effect import Bench, Effect, size
 
 
@@ -20,7 +21,7 @@ class MocapFeed(Effect):
         "vehicle file but the noise, which is FSC-Lab's"
     )
 
-    rate: float = size("of the poses", "Hz", 10.0, 1000.0)
+    rate: float = size("of the poses", "Hz", LEAST_RATE, LARGEST_RATE)
     position_noise: float = size("standard deviation of a pose", "m", 0.0, 0.1)
     attitude_noise: float = size("the same about each axis", "rad", 0.0, 0.2)
     latency: float = size("from exposure to arrival", "s", 0.0, 0.5)

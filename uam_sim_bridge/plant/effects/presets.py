@@ -5,7 +5,7 @@
     battery_sag: off
     servo_noise: {torque: [0.022, 0.015], bandwidth: 5.0}      a number for each joint
 
-A parameter that a file does not give is that of laboratory.yaml.
+A parameter that a file does not give is that of laboratory.yaml, or of odometry.yaml.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.engines import PlantError
 
-CALM, LABORATORY = "calm", "laboratory"
+CALM, LABORATORY, ODOMETRY = "calm", "laboratory", "odometry"
 Effects = dict[str, dict[str, float | list[float]]]  # name → parameters
 
 
@@ -78,7 +78,7 @@ def _change(effects: Effects, name: object, value: object, where: str) -> None:
         return
     if value is not True and not isinstance(value, Mapping):
         raise PlantError(f"{where}{name}: {value!r}: on, off or parameters expected")
-    usual = effects.get(name) or laboratory().get(name, {})
+    usual = effects.get(name) or usual_numbers().get(name, {})
     given = {} if value is True else dict(value)
     for parameter, number in given.items():  # a number is a list of one
         if isinstance(getattr(EFFECTS[name], parameter, None), tuple):
@@ -88,6 +88,13 @@ def _change(effects: Effects, name: object, value: object, where: str) -> None:
     except ParameterError as error:
         raise PlantError(f"{where}{name}: {error}") from None
     effects[name] = checked.to_mapping()
+
+
+@cache
+def usual_numbers() -> Effects:
+    """Return the numbers of each effect, by name: of the laboratory, which has no odometry."""
+    odometry = yaml_file.read(configuration.path(f"plant/{ODOMETRY}.yaml"), PlantError)
+    return laboratory() | odometry | laboratory()
 
 
 @cache
@@ -103,9 +110,9 @@ def _shown(value: float | list[float]) -> str:
 
 
 def table() -> str:
-    """Return effects, sources and the laboratory's numbers in Markdown: of docs/plant.md."""
-    lines = ["| effect | does | parameters (laboratory) | source |", "|---|---|---|---|"]
-    for name, values in laboratory().items():
+    """Return effects, sources and usual numbers in Markdown: of docs/plant.md."""
+    lines = ["| effect | does | parameters (usual) | source |", "|---|---|---|---|"]
+    for name, values in usual_numbers().items():
         kind = EFFECTS[name]
         words = "; ".join(
             f"`{parameter}`: {spec.description} "
