@@ -55,28 +55,30 @@ def test_what_failures_have_in_common_is_found():
     "scenario", ["hover", pytest.param("pick_and_place", marks=pytest.mark.slow)]
 )
 def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys, monkeypatch):
-    command = ["campaign", "--scenario", scenario, "--out", str(tmp_path)]
+    mine, out = tmp_path / "mine.yaml", tmp_path / "out"
+    shutil.copy(configuration.path(f"scenarios/{scenario}.yaml"), mine)
+    command = ["campaign", "--scenario", str(mine), "--jobs", "1", "--out", str(out)]
     assert main([*command, "--flights", str(FLIGHTS)]) == 0
-    found = json.loads((tmp_path / "campaign.json").read_text())
+    found = json.loads((out / "campaign.json").read_text())
     assert found["flights"] == FLIGHTS and found["outcomes"]["lost"] == 0
     completed = found["outcomes"]["completed"]
     assert completed >= FLIGHTS // 2 and sum(found["outcomes"].values()) == FLIGHTS
     assert f"{completed} of {FLIGHTS} flights completed" in capsys.readouterr().out
-    rows = list(csv.DictReader((tmp_path / "flights.csv").open()))
+    rows = list(csv.DictReader((out / "flights.csv").open()))
     assert len(rows) == FLIGHTS
     assert all(np.isfinite(float(row["rms x"])) for row in rows)
-    assert (tmp_path / "campaign.png").stat().st_size > 0
+    assert (out / "campaign.png").stat().st_size > 0
 
-    page = (tmp_path / "report.html").read_text()
+    page = (out / "report.html").read_text()
     worst = found["worst"][0]
     assert len(found["worst"]) == FLIGHTS and page.count("--replay</code>") == FLIGHTS
 
-    whole = (tmp_path / "flights.parquet").read_bytes()
+    whole = (out / "flights.parquet").read_bytes()
     for file in ("flights.csv", "report.html"):
-        (tmp_path / file).unlink()
+        (out / file).unlink()
     assert main([*command, "--flights", str(FLIGHTS)]) == 0
     assert f"continuing after {FLIGHTS} earlier flights" in capsys.readouterr().out
-    assert (tmp_path / "flights.parquet").read_bytes() == whole
+    assert (out / "flights.parquet").read_bytes() == whole
     assert main([*command, "--seed", "2"]) == 2
     assert "give another --out" in capsys.readouterr().err
 
@@ -84,19 +86,13 @@ def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys, mo
     fly = fly_command.fly
     monkeypatch.setattr(fly_command, "fly", lambda settings, **_: fly(settings, False, False))
     again = shlex.split(worst["again"])[1:]
-    assert main([*again, "--out", str(tmp_path / "again")]) == (worst["outcome"] != "completed")
-    metrics = json.loads((tmp_path / "again/metrics.json").read_text())
-    row = pq.read_table(tmp_path / "flights.parquet").to_pylist()[worst["flight"]]
+    assert main([*again, "--out", str(out / "again")]) == (worst["outcome"] != "completed")
+    metrics = json.loads((out / "again/metrics.json").read_text())
+    row = pq.read_table(out / "flights.parquet").to_pylist()[worst["flight"]]
     flown = [value for name, value in row.items() if name.startswith("rms.")]
     assert flown == [value for key, _, _ in GROUPS for value in metrics["rms"][key]]
 
-
-def test_any_workers_give_the_same_table(tmp_path):
-    """One process, and two workers of a scheduler that are given everything but the sources."""
-    scenario = tmp_path / "mine.yaml"
-    shutil.copy(configuration.path("scenarios/hover.yaml"), scenario)
-    command = ["campaign", "--scenario", str(scenario), "--flights", "3", "--out"]
-    assert main([*command, str(tmp_path / "a"), "--jobs", "1"]) == 0
+    # the same table by two workers of a scheduler that are given everything but the sources
     with LocalCluster(
         n_workers=2,
         threads_per_worker=1,
@@ -104,10 +100,10 @@ def test_any_workers_give_the_same_table(tmp_path):
         dashboard_address=None,
         silence_logs=50,
     ) as cluster:
-        there = ["--scheduler", cluster.scheduler_address]
-        assert main([*command, str(tmp_path / "b"), *there]) == 0
-    tables = [(tmp_path / folder / "flights.parquet").read_bytes() for folder in "ab"]
-    assert tables[0] == tables[1]
+        there = ["--flights", str(FLIGHTS), "--out", str(tmp_path / "there")]
+        there += ["--scheduler", cluster.scheduler_address]
+        assert main(["campaign", "--scenario", str(mine), *there]) == 0
+    assert (tmp_path / "there/flights.parquet").read_bytes() == whole
 
 
 def test_replay_and_workers_are_refused_in_one_line(capsys):

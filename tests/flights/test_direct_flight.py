@@ -30,7 +30,7 @@ def flight(scenario="pick_and_place", profile="s500", payload=0.2, seed=1, **cha
 
 def fly_until(a_flight, time):
     while a_flight.mission.output.time < time and not a_flight.mission.output.done:
-        a_flight.tick()
+        a_flight.advance(5, 5)
     return a_flight
 
 

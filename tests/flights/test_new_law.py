@@ -9,6 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 from whole_flight import ROOT, SHORT
 
+from uam_lab.records.results.timeseries import read
+
 # what the line in uam_control/laws/catalogue.py does
 WITH_PID = """\
 import sys
@@ -16,14 +18,15 @@ sys.path.insert(0, "tests")
 from pid_law import PidLaw
 from uam_control.laws import catalogue
 catalogue.LAWS["pid"] = PidLaw
-from uam_lab.cli.main import main
-sys.exit(main())
 """
+# a step that is not under @jit splits the loop of the flight: nothing is compiled for it
+IN_PYTHON = "PidLaw.step = staticmethod(getattr(PidLaw.step, 'py_func', PidLaw.step))\n"
+RUN = "from uam_lab.cli.main import main\nsys.exit(main())\n"
 
 
-def uam(*options):
+def uam(*options, law=WITH_PID + IN_PYTHON):
     """Run `uam` with the law registered."""
-    command = [sys.executable, "-c", WITH_PID, *options]
+    command = [sys.executable, "-c", law + RUN, *options]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=240)
 
 
@@ -43,6 +46,16 @@ def test_a_law_of_one_file_completes_a_flight(folder):
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["mission_completed"] and metrics["controller"] == "pid"
     assert max(metrics["rms"]["position_m"]) < 0.1
+
+
+@pytest.mark.long  # the law and the loop of a flight are compiled for it: a minute
+def test_its_compiled_step_flies_the_same(folder, tmp_path):
+    options = ("--engine", "direct", "--no-report", "--out", str(tmp_path))
+    scenario = ("--scenario", str(folder.parent / "short.yaml"))
+    flown = uam("fly", "--controller", "pid", *scenario, *options, law=WITH_PID)
+    assert flown.returncode == 0, flown.stdout + flown.stderr
+    one, other = (read(place / "timeseries.parquet") for place in (folder, tmp_path))
+    np.testing.assert_array_equal(one.values, other.values)
 
 
 def test_its_gains_are_recorded_one_per_axis(folder):
