@@ -74,17 +74,15 @@ class LeanExecutor:
 
     def _gather(self) -> None:
         """Collect the nodes' subscriptions and create the wait set."""
-        first = self._nodes[0]
-        names = {first.resolve_topic_name(name) for name in self._trigger_names}
-        every = [
-            (s, d) for n, d in zip(self._nodes, self._doors, strict=True) for s in n.subscriptions
-        ]
+        nodes, triggers = self._nodes, self._trigger_names
+        names = {node.resolve_topic_name(name) for node in nodes for name in triggers}
+        every = [(s, d) for n, d in zip(nodes, self._doors, strict=True) for s in n.subscriptions]
         by_trigger = sorted(every, key=lambda one: one[0].topic_name in names)
         self._taken = [one for one in by_trigger if self._often(one[0])]
         self._rare = [one for one in by_trigger if not self._often(one[0])]
         self._triggers = [s.handle for s, _ in self._taken if s.topic_name in names]
         self._inputs = [s.handle for s, _ in self._taken]
-        self._messages = WaitSet(len(self._inputs), 0, 0, 0, 0, 0, first.context.handle)
+        self._messages = WaitSet(len(self._inputs), 0, 0, 0, 0, 0, nodes[0].context.handle)
 
     def spin_once(self, timeout: float) -> None:
         """Serve all ready entities; wait for a message at most `timeout` [s].
