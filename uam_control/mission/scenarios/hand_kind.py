@@ -57,7 +57,7 @@ SWING = 15.0  # [deg] of a joint without amplitude: that of the published tasks
 FREE = math.radians(5.0)  # of a joint's range, beyond the swing, on both sides
 LEVEL_AXIS = 0.5  # largest height of the axis of a joint that lifts the hand
 TURNS = 0.05  # least singular value of a task that the arm has, and rate of elevation per joint
-SINGULAR = 0.04  # least singular value of the hand's Jacobian per reach
+SINGULAR = 0.02  # least singular value of the hand's Jacobian per reach
 PASSES = 1e-3  # [m, rad] of a curve through a file's rows
 LOOKS = 0.1  # [s] between two checks of a posture
 

@@ -36,8 +36,9 @@ SAMPLES = 5  # between two knots
 BEFORE = 2.0  # [s] in which the base begins before the hand, and ends after it
 MEETS, MEETS_ANGLE = 1e-4, 1e-3  # [m], [rad] of the hand, from its task
 CLOSE = 2e-5  # [m, rad] at which the iteration ends
-ROUNDS, BETTER = 40, 0.9  # of the iteration; it goes on while each is better by this factor
-DAMPING = 1e-6  # of the joints' correction, relative to the largest singular value
+# of the iteration; after the first ones it goes on while each is better by this factor
+ROUNDS, FIRST, BETTER = 40, 4, 0.9
+DAMPING = 1e-9  # of the joints' correction, relative to the largest singular value
 
 
 class Unreachable(ValueError):
@@ -93,7 +94,9 @@ def holding(task: Task, base: Polynomials, flyer: Flyer) -> Polynomials:
 
     def corrected(chi: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
         slopes = jacobians(flyer.chain, flown.chi, columns)[:, kept]
-        chi[:, columns] += _least(slopes, off[:, kept])
+        posture = _wanted(task, flown.times)[:, columns]
+        left = np.einsum("ijk,ik->ij", slopes, chi[:, columns] - posture)
+        chi[:, columns] = posture + _least(slopes, off[:, kept] + left)
 
     return _solved(task, flyer, base, corrected)
 
@@ -119,12 +122,12 @@ def _solved(
         else:
             chi[:, POSITION] = _wanted(Task(base, False, False, ()), times)[:, POSITION]
         least = math.inf
-        for _ in range(ROUNDS):
+        for done in range(ROUNDS):
             (motion,) = fitted(times, [CurveSamples(chi)], math.inf, step)
             flown = flat(motion, times, flyer)
             off = _off(flown.chi, wanted, task, flyer)
             least, before = np.abs(off).max(), least
-            if not CLOSE <= least <= BETTER * before:
+            if least < CLOSE or (done >= FIRST and not least <= BETTER * before):
                 break
             chi = motion.rows(times, 1)[CHI]
             corrected(chi, flown, off)
