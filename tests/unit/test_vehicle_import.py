@@ -411,6 +411,17 @@ def test_a_joint_with_a_name_of_ours_is_refused(tmp_path):
         imported(tmp_path, drone().replace("joint_0", "base"))
 
 
+def test_directions_that_make_roll_and_yaw_one_are_not_taken(tmp_path):
+    """Both rotors of a side turn alike in this file: neighbours turn against each other then."""
+    text = MJCF.replace("0 0 1 0 0 -.02", "left").replace("0 0 1 0 0 .02", "right")
+    for old, new in (("left", "-"), ("right", ""), ("left", ""), ("right", "-")):
+        text = text.replace(old, f"0 0 1 0 0 {new}.02", 1)
+    made, _ = imported(tmp_path, text, "x2.xml")
+    turned = [one.counter_clockwise for one in made.description.rotors]
+    assert turned in ([True, False] * 2, [False, True] * 2)
+    assert any("rotors.layout (assumed: neighbours turn" in line for line in made.missing)
+
+
 def test_an_error_of_mujoco_names_file_and_line(tmp_path):
     with pytest.raises(ImportRefused, match=r"x2.xml.*line 2"):
         imported(tmp_path, MJCF.replace('type="box"', 'type="bax"'), "x2.xml")

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from uam_control.setpoints.rotor_geometry import effectiveness
 from uam_lab.importing.source import RotorFacts, Source, place
 
 NAMES = (r"rotor", r"prop(eller)?(?!rio)", r"motor|thrust")
@@ -159,12 +160,15 @@ def _apart(rotors: list[FoundRotor]) -> list[FoundRotor]:
 def turns(rotors: Sequence[FoundRotor]) -> tuple[list[bool], bool]:
     """Return for each rotor whether it turns counter-clockwise, and whether the file says so.
 
-    Else neighbours turn in opposite directions, and rotors above each other too.
+    Else, and where roll and yaw would be one, neighbours turn in opposite directions, and rotors
+    above each other too.
     """
     stated = [one.facts.counter_clockwise for one in rotors]
-    if all(turn is not None for turn in stated):
-        return [bool(turn) for turn in stated], True
     places = np.array([one.position for one in rotors])
+    if all(turn is not None for turn in stated):
+        moments = np.where(np.array(stated, dtype=bool), 1.0, -1.0)
+        if np.linalg.matrix_rank(effectiveness(places[:, 0], -places[:, 1], moments)) == 4:
+            return [bool(turn) for turn in stated], True
     angles = np.arctan2(places[:, 1], places[:, 0])
     order = sorted(range(len(rotors)), key=lambda i: (round(angles[i], 2), -places[i, 2]))
     found, column, last = [False] * len(rotors), -1, None
