@@ -107,7 +107,7 @@ class Imu:
 
 
 class MocapArrays(NamedTuple):
-    """Of a `Mocap`. taken (2, POSE): newest pose of vehicle and payload, see `take_poses`; due (2,
+    """Of a `Mocap`. taken (2, POSE): newest pose of vehicle and payload, see `take_pose`; due (2,
     WAITING) [ticks] and poses (2, WAITING, POSE): of those that have not arrived, in rings;
     first, count, arrived (2,): of the rings; arrived: how many at this tick, the rows before first.
     grip (3,) [m]: the payload's; numbers (1,): see REAL."""
