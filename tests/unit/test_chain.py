@@ -11,7 +11,6 @@ from uam_control.arm.chain import Chain, ChainParameters, as_parameters, carryin
 from uam_control.arm.dynamics import gravity_torque, inverse_dynamics, mass_matrix
 from uam_control.arm.kinematics import (
     DOWN,
-    arm_centre,
     hand_jacobian,
     hand_pose,
     vehicle_centre,
@@ -209,7 +208,6 @@ def test_one_and_two_links_by_hand():
     np.testing.assert_allclose([*push, *moment], [0, 0, 30, 0, -45, 0], atol=1e-12)
     position, _ = hand_pose(chain, q, DOWN)
     np.testing.assert_allclose(position, [2.0, 0.0, -0.1], atol=1e-12)
-    np.testing.assert_allclose(arm_centre(chain, q, DOWN), [4.5 / 3, 0.0, -0.1], atol=1e-12)
     mass = np.zeros((2, 2))
     mass_matrix(chain, q, mass)
     np.testing.assert_allclose(mass, [[1 * 0.25 + 2 * 4, 2 * 2], [2 * 2, 2 * 1]], atol=1e-12)

@@ -126,13 +126,6 @@ def arm_moment(chain: Chain, angles: np.ndarray, down: Vector) -> tuple[float, V
 
 
 @jit
-def arm_centre(chain: Chain, angles: np.ndarray, down: Vector) -> Vector:
-    """Return the centre of mass [m] of the links."""
-    mass, moment = arm_moment(chain, angles, down)
-    return times(1.0 / mass, moment)
-
-
-@jit
 def vehicle_centre(chain: Chain, angles: np.ndarray, down: Vector) -> Vector:
     """Return the centre of mass [m] of base and links."""
     mass, moment = arm_moment(chain, angles, down)

@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from uam_control.arm.dynamics import gravity_torque, mass_matrix
+from uam_control.arm.hand import hands
+from uam_control.arm.kinematics import ORIGIN
 from uam_control.coordinates import ALPHA
 from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.sight import RunningMean
@@ -111,7 +114,8 @@ def warm_up(laws: Iterable[str]) -> None:
 
 def _flight(law: str) -> DirectFlight:
     scenario = load_scenario("hover")
-    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
+    effects = presets.read([presets.LABORATORY, presets.ODOMETRY])
+    vehicle = Vehicle.load().changed({"effects": effects})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
     return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
 
@@ -138,7 +142,11 @@ def _others() -> None:
     for stamp in (0.0, 0.004):
         mean.add(stamp, np.zeros(3))
     joints = len(curve.arm_start)
-    hand_and_levers(chain_of(vehicle), np.zeros(ALPHA + joints))
+    chain, still = chain_of(vehicle), np.zeros(joints)
+    hand_and_levers(chain, np.zeros(ALPHA + joints))
+    hands(chain, np.zeros((1, ALPHA + joints)), np.zeros(1))
+    gravity_torque(chain, still, ORIGIN, still.copy())  # of the bring-up
+    mass_matrix(chain, still, np.zeros((joints, joints)))  # of nobody here: for users
     vision_message(VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0))
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
 
