@@ -11,6 +11,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.stability import analyse_folder
+from uam_lab.analysis.supply import COLUMNS_OF
 from uam_lab.analysis.tracking import Tracking
 from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import figures, panels
@@ -179,12 +180,12 @@ def test_a_real_flight(analysed):
     assert found["V"]["within_bound"] == 1.0
     assert min(found[name]["step_inequality_holds"] for name in analysed.subsystems) > 0.99
     position, attitude, arm = (found[name] for name in ("position", "attitude", "arm"))
-    # integral action holds the payload's weight; the autopilot compensates the arm's torque
+    # theta_hat holds the payload's weight; the autopilot compensates the arm's torque
     assert position["coupling"]["rms"][2] == pytest.approx(1.23, abs=0.1)
-    assert 0.7 < position["coupling"]["integral_share"] < 1.1
+    assert 0.7 < position["coupling"]["adaptive_share"] < 1.1
     assert attitude["coupling"]["actuators_share"] > 0.9
     # the known load of the arm is fed forward; the rest is the payload's
-    arm_shares = arm["coupling"]["feedforward_share"] + arm["coupling"]["integral_share"]
+    arm_shares = arm["coupling"]["feedforward_share"] + arm["coupling"]["adaptive_share"]
     assert 0.9 < arm_shares < 1.1
     assert arm["coupling"]["actuators_share"] is None
     assert position["xi_max"] < position["xi_bound"]
@@ -202,9 +203,10 @@ def test_sigma_satisfies_the_error_equation(analysed, direct_flight):
     np.testing.assert_allclose(acceleration, true, atol=1e-9)
     regressors = constants.regressor(analysed.truth)
     for name, one in analysed.subsystems.items():
-        for star in (one.constants, one.printed):
+        sigma = analysed.coupling.sigma[:, COLUMNS_OF[name]]
+        for star, theta in ((one.constants, one.theta), (one.printed, 0.0)):
             bound = regressors @ star
-            assert np.all(analysed.coupling.sigma_norm(name) <= bound * (1 + 1e-9))
+            assert np.all(np.linalg.norm(sigma - theta, axis=1) <= bound * (1 + 1e-9))
 
 
 def test_figures_of_a_flight_of_three_seconds(short_direct_flight, tmp_path):

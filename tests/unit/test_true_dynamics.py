@@ -113,12 +113,14 @@ def test_terms_of_the_law_add_up_to_the_recorded_tau(direct_flight):
     terms = supply.along(direct_flight, rows, estimate, sets, Body(VEHICLE))
     p = sets["position_controller"]
     law = np.array(p.inertia) * estimate.acceleration_d[:, :3]
-    law += (terms.feedback + terms.adaptive)[:, :3]
+    # what theta_hat has become at this tick is what the next one uses
+    carried = -np.array(p.inertia) * supply.bias(direct_flight, "position")[rows + 1]
+    law += (terms.feedback + terms.adaptive)[:, :3] - carried
     velocity = direct_flight.block("reference.")[rows, 8:11]
     law += p.gravity_feedforward_mass * np.array(p.drag_feedforward) * velocity
-    # the force is for the mass that the integral holds up
-    law *= 1.0 + terms.integral[:, 2:3] / p.inertia[2] / p.gravity
-    law += terms.integral[:, :3]
+    # the force is for the mass that theta_hat holds up
+    law *= 1.0 + carried[:, 2:3] / p.inertia[2] / p.gravity
+    law += carried
     law += terms.weight[:, :3]
     np.testing.assert_allclose(law, terms.tau[:, :3], atol=1e-6)
     others = terms.feedforward + terms.feedback + terms.adaptive + terms.weight + terms.integral

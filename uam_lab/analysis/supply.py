@@ -62,9 +62,13 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
 
 
 def bias(series: Series, subsystem: str) -> np.ndarray:
-    """Return theta_hat (ticks, n) [m/s^2 or rad/s^2] as recorded."""
+    """Return theta_hat (ticks, n) [m/s^2 or rad/s^2] as used at each tick.
+
+    A row has what the law has made of it at its tick, for the next one.
+    """
     axes = range(1, series.columns.size - ALPHA + 1) if subsystem == "arm" else range(1, 4)
-    return np.column_stack([series[f"adaptation.{subsystem}.bias{i}"] for i in axes])
+    made = np.column_stack([series[f"adaptation.{subsystem}.bias{i}"] for i in axes])
+    return np.vstack([made[:1], made[:-1]])
 
 
 def integral_action(series: Series, p: PositionLimits | ArmLimits, columns: slice) -> np.ndarray:
