@@ -90,7 +90,8 @@ class GroundStation:
 class WiredAutopilot:
     """The stand-in behind sockets, in place of `JoinedAutopilot`; `link`: the bridge's end."""
 
-    def __init__(self, autopilot, sequence) -> None:
+    def __init__(self, autopilot, sequence, network) -> None:
+        assert network is None, "the sockets do not delay"
         self.autopilot, self.sequence, self.motors = autopilot, sequence, autopilot.motors
         self.time = 0.0
         self._companion = Companion(autopilot)

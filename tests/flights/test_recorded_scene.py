@@ -38,7 +38,7 @@ def test_what_is_shown_is_recorded_with_its_schema(log):
     assert log.counts["/robot_description"] == log.counts["/tf_static"] == 1
     seconds = log.counts["/uam/state"] / 250.0
     assert log.counts["/tf"] > 2.0 * seconds, "some a second, however busy the machine is"
-    vehicle = {"world", "base_link", "shoulder", "link_1", "link_2", "magnet"}
+    vehicle = {"world", "base_link", "shoulder", "link_1", "link_2", "magnet", "end_effector"}
     assert vehicle | {"reference", "payload"} == log.frames
 
 
