@@ -58,7 +58,7 @@ TRAJECTORIES = [
     (
         f"{CSV_HEAD},alpha_1,alpha_2,alpha_3\n",
         "column 'alpha_3' is unknown",
-        "dyaw,alpha_1,alpha_2",
+        "dyaw,magnet,alpha_1,alpha_2",
     ),
 ]
 PROFILES = [
