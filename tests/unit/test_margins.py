@@ -123,7 +123,7 @@ def test_rotor_with_one_lag_is_that_lag(vehicle):
     rotors = Rotors(numbers, 0.002)
     thrust = 5.0
     command, slope, lag = rotor_model(rotors, thrust, 0.002)
-    full, factor = rotors.constants[1], rotors.constants[2]
+    full, factor = rotors.constants[1], numbers["curve_factor"]
     assert full * (factor * command**2 + (1.0 - factor) * command) == pytest.approx(thrust)
     assert slope == pytest.approx(full * (2.0 * factor * command + 1.0 - factor), rel=1e-3)
     # the plant applies the speed at the end of a physics step during that step: half a step less
