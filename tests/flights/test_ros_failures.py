@@ -35,7 +35,7 @@ def kept(flight):
 )
 def test_a_killed_node_ends_the_flight_and_is_named(fly, long_scenario, victim):
     flight = fly("--scenario", str(long_scenario))
-    flight.until_phase("take-off")
+    flight.until_phase("hover")
     nodes = flight.children()
     assert len(nodes) == 10
     os.kill(nodes[victim], signal.SIGKILL)
@@ -87,7 +87,7 @@ def test_a_recorder_without_processor_time_loses_nothing(fly):
 @pytest.mark.slow
 def test_a_node_that_hangs_is_named_and_killed(fly, long_scenario):
     flight = fly("--scenario", str(long_scenario))
-    flight.until_phase("take-off")
+    flight.until_phase("hover")
     nodes = flight.children()
     os.kill(nodes["arm_controller"], signal.SIGSTOP)
     assert flight.wait() == 1
@@ -118,7 +118,7 @@ def test_a_node_that_stops_for_a_while_changes_nothing(fly, short_scenario, shar
 
 def test_ctrl_c_keeps_what_was_flown(fly, long_scenario):
     flight = fly("--scenario", str(long_scenario), report=True)
-    flight.until_phase("take-off")
+    flight.until_phase("hover")
     nodes = flight.children()
     flight.process.send_signal(signal.SIGINT)
     assert flight.wait() == 130
