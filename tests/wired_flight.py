@@ -28,6 +28,7 @@ from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 GROUND_STATION = 255, 190  # system and component
 KILL_CHANNEL = 7
@@ -93,7 +94,7 @@ class WiredAutopilot:
     def __init__(self, autopilot, sequence, network) -> None:
         assert network is None, "the sockets do not delay"
         self.autopilot, self.sequence, self.motors = autopilot, sequence, autopilot.motors
-        self.time = 0.0
+        self.time, self.network = 0.0, SetpointDelay(0.0, 0.0, 0.0, 0)
         self._companion = Companion(autopilot)
         self.link = OffboardLink(None, sequence, RateThrustParameters.of(load_description()))
         self.connect()
