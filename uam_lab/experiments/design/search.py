@@ -18,7 +18,7 @@ import numpy as np
 
 from uam_control.coordinates import PITCH, ROLL, YAW, Z
 from uam_control.estimation import EstimatorParameters
-from uam_control.profiles.profile import Profile, profile_of
+from uam_control.profiles.profile import Profile, ProfileError, profile_of
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.design.facts import Facts, payload
@@ -65,12 +65,15 @@ def design(
     """
     search = Search(described, criteria)
     for number in range(1, ROUNDS + 1):
-        found = search.evaluated()
+        try:
+            found = search.evaluated()
+        except ProfileError:  # a gain below what a profile may have: slower does not help
+            break
         progress(f"round {number}: {found.summary}")
         if not found.slower:
             return search.result(found)
         search.slow_down(found.slower)
-    raise DesignError(f"{described.name}: no gains within {ROUNDS} rounds: {found.summary}")
+    raise DesignError(f"{described.name}: no gains within {number} rounds: {found.summary}")
 
 
 @dataclass(frozen=True)
