@@ -83,8 +83,8 @@ def test_every_tick_is_in_the_table(shared_flights):
     names = [name for name, _, _ in series.phase_spans()]
     assert names == ["waiting", "take-off", "hover", "land", "landed"]
     flown = series.values[series.flown]
-    names = ModularLaw.gain_names(3)
-    own = [gain_columns(subsystem, names, COLUMNS) for subsystem in timeseries.SUBSYSTEMS]
+    axes = {"position": 3, "attitude": 3, "arm": COLUMNS.joints}
+    own = [gain_columns(name, ModularLaw.gain_names(n), COLUMNS) for name, n in axes.items()]
     others = np.ones(flown.shape[1], dtype=bool)
     others[COLUMNS.block("adaptation.")] = False
     others[np.concatenate(own)] = True
