@@ -18,20 +18,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.laws.geometric import GeometricParameters
 from uam_control.laws.law import GainGroup, Law, LawInputs
-from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import jit
-from uam_control.settings.parameter_set import HUGE, TINY, choice, number, vector
+from uam_control.settings.parameter_set import choice, number
 
 
 @dataclass(frozen=True)
-class IndiParameters(LawParameters):
-    """One entry per axis."""
+class IndiParameters(GeometricParameters):
+    """The feedback, and the low-pass."""
 
     law: str = choice("indi", "the law that flies, fixed", ("indi",), fixed=True)
-    inertia: tuple = vector((), "Mbar, its diagonal", "kg or kg m^2", TINY, 1e3)
-    lambda_1: tuple = vector((), "lambda_1, gain on e", "1/s^2", TINY, HUGE)
-    lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
     indi_cutoff: float = number(3.0, "low-pass of torque and acceleration", "Hz", 0.01, 100.0)
 
 
