@@ -33,7 +33,7 @@ from uam_control.estimation.pose_filter import (
     wait,
 )
 from uam_control.estimation.pose_gate import settled, suspend
-from uam_control.estimation.waiting import drop_first, make_room
+from uam_control.estimation.waiting import insert
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import record
 from uam_control.maths.rotations import (
@@ -260,13 +260,8 @@ def take_imu(
 @jit
 def take_joints(a: EstimatorArrays, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
     """Let joint readings at `stamp` [s] wait: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
-    m, n = a.numbers[0], len(alpha)
-    if m.waiting == READINGS:
-        m.waiting = drop_first(a.readings, m.waiting)
-    place = make_room(a.readings, m.waiting, stamp)
-    a.readings[place, 1 : 1 + n] = alpha
-    a.readings[place, 1 + n :] = alpha_dot
-    m.waiting += 1
+    m = a.numbers[0]
+    m.waiting = insert(a.readings, m.waiting, stamp, alpha, alpha_dot)
 
 
 @jit

@@ -18,7 +18,7 @@ from uam_control.estimation.history import OLDEST_MATCH, value_at
 from uam_control.estimation.pose_clock import PoseClock, counts, forget_clock, waits
 from uam_control.estimation.pose_gate import PoseGate, forget_rejections, rejects
 from uam_control.estimation.repeats import Repeats, repeated
-from uam_control.estimation.waiting import drop_first, make_room
+from uam_control.estimation.waiting import drop_first, insert
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (
@@ -236,12 +236,7 @@ def wait(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.nda
             m.waiting -= 1
         a.gate[0].refused += 1
         return
-    if m.waiting == HISTORY:
-        m.waiting = drop_first(a.ahead, m.waiting)
-    place = make_room(a.ahead, m.waiting, stamp)
-    a.ahead[place, 1 : 1 + TURN] = position
-    a.ahead[place, 1 + TURN :] = quaternion
-    m.waiting += 1
+    m.waiting = insert(a.ahead, m.waiting, stamp, position, quaternion)
 
 
 @jit

@@ -22,6 +22,22 @@ def make_room(queue: np.ndarray, count: int, stamp: float) -> int:
 
 
 @jit
+def insert(
+    queue: np.ndarray, count: int, stamp: float, first: np.ndarray, second: np.ndarray
+) -> int:
+    """Let a sample of `stamp` [s] wait, two vectors in a row; return how many wait.
+
+    queue (m, w): see `make_room`; w = 1 + len(first) + len(second). If full, it forgets its oldest.
+    """
+    if count == len(queue):
+        count = drop_first(queue, count)
+    place, middle = make_room(queue, count, stamp), 1 + len(first)
+    queue[place, 1:middle] = first
+    queue[place, middle:] = second
+    return count + 1
+
+
+@jit
 def drop_first(queue: np.ndarray, count: int) -> int:
     """Forget the oldest of the `count` samples that wait; return how many are left."""
     for i in range(1, count):
