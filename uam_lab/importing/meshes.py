@@ -7,9 +7,8 @@ from urllib.parse import unquote
 
 import mujoco
 import numpy as np
-from lxml import etree
 
-from uam_lab.importing.source import ImportRefused
+from uam_lab.importing.source import ImportRefused, XmlElement
 
 READ = (".stl", ".obj", ".msh")  # by MuJoCo
 LARGEST_MESH = 100e6  # [bytes]
@@ -27,7 +26,7 @@ class Meshes:
         self.notes: list[str] = []
         self._names: dict[tuple[Path, str], str] = {}  # by file and scale
 
-    def take(self, mesh: etree._Element) -> bool:
+    def take(self, mesh: XmlElement) -> bool:
         """Find the file of a mesh element and name it as in `assets`; False: it is left out.
 
         Raises ImportRefused for a mesh that is as large as a house.
@@ -67,7 +66,7 @@ class Meshes:
             tried += [folder / Path(*words[begin:]) for folder in above]
         return next((one for one in tried if one.is_file()), None)
 
-    def _left_out(self, mesh: etree._Element, given: str, why: str) -> bool:
+    def _left_out(self, mesh: XmlElement, given: str, why: str) -> bool:
         text = f"mesh {given} {why}: not shown"
         if not any(note.startswith(text) for note in self.notes):
             self.notes.append(f"{text} (line {mesh.sourceline})")

@@ -13,6 +13,7 @@ from uam_lab.importing.source import (
     JointFacts,
     RotorFacts,
     Source,
+    XmlElement,
     refused_by_mujoco,
     tree,
 )
@@ -23,7 +24,7 @@ TEXTS = ("name", "class", "childclass", "file", "model")  # attributes without n
 KINDS = {"body": "body", "joint": "joint", "freejoint": "joint", "site": "site"}
 
 
-def read(file: Path, root: etree._Element) -> Source:
+def read(file: Path, root: XmlElement) -> Source:
     """Return the source of an MJCF with its includes. Raises ImportRefused."""
     lines: dict[tuple[str, str], str] = {}
     _note_lines(file, root, file.parent, lines)
@@ -45,9 +46,7 @@ def read(file: Path, root: etree._Element) -> Source:
     return source
 
 
-def _note_lines(
-    file: Path, root: etree._Element, folder: Path, lines: dict, depth: int = 0
-) -> None:
+def _note_lines(file: Path, root: XmlElement, folder: Path, lines: dict, depth: int = 0) -> None:
     """Note file and line of each named part, includes too."""
     if depth > DEEPEST:
         raise ImportRefused(f"{file}: includes more than {DEEPEST} deep")

@@ -12,6 +12,7 @@ from lxml import etree
 
 from uam_control.settings import configuration
 from uam_lab.importing import geometry
+from uam_lab.importing.source import XmlElement
 from uam_lab.importing.standing import Stance
 from uam_lab.importing.structure import OWN, Parts
 
@@ -67,7 +68,7 @@ class MjcfText:
         file.write_text(head + etree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
         return file
 
-    def _arm(self, base: etree._Element) -> None:
+    def _arm(self, base: XmlElement) -> None:
         parts, above = self.parts, base
         for link, joint in enumerate(parts.joints, 1):
             body_name = self._free_name(parts.model.body(parts.model.jnt_bodyid[joint]).name, link)
@@ -107,7 +108,7 @@ class MjcfText:
             for (key, usual), value in zip(WORLD_DYNAMICS.items(), stated, strict=True)
         }
 
-    def _body(self, body: etree._Element, link: int) -> None:
+    def _body(self, body: XmlElement, link: int) -> None:
         """Add inertia and shapes of a link."""
         mass, centre, tensor = geometry.inertial(self.parts, link)
         six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
@@ -129,7 +130,7 @@ class MjcfText:
         origin, own = self.parts.frame(link)
         return own.T @ (place - origin), own.T @ axes
 
-    def _shown(self, body: etree._Element, link: int, geom: int) -> None:
+    def _shown(self, body: XmlElement, link: int, geom: int) -> None:
         """Add a shape that is seen only."""
         model = self.parts.model
         place, axes = self._in(link, *geometry.pose_of(self.parts, geom))
@@ -160,7 +161,7 @@ class MjcfText:
             self._assets[name] |= {"inertia": "shell"}
         return name
 
-    def _solid(self, body: etree._Element, link: int, geom: int) -> None:
+    def _solid(self, body: XmlElement, link: int, geom: int) -> None:
         """Add a shape that touches ground and payload; a mesh by its box."""
         model, data = self.parts.model, self.parts.data
         kind = KINDS.get(mujoco.mjtGeom(model.geom_type[geom]))
@@ -174,12 +175,12 @@ class MjcfText:
         shape |= {"pos": text(place), "quat": text(quaternion(axes)), "mass": "0"}
         etree.SubElement(body, "geom", shape | {"group": HIDDEN})
 
-    def _bar(self, body: etree._Element, ends: list[float], radius: str) -> None:
+    def _bar(self, body: XmlElement, ends: list[float], radius: str) -> None:
         """Add a bar that is seen only, between two ends (6,) [m]."""
         bar = {"type": "capsule", "fromto": text(ends), "size": radius, "mass": "0"}
         etree.SubElement(body, "geom", bar | {"material": "carbon"})
 
-    def _feet(self, base: etree._Element) -> None:
+    def _feet(self, base: XmlElement) -> None:
         for i, foot in enumerate(self.stance.feet, 1):
             if self.stance.legs.value:
                 self._bar(base, [0.3 * foot[0], 0.3 * foot[1], 0.0, *foot], LEG)

@@ -17,6 +17,7 @@ OTHERS = {
     "mujocoinclude": "the file that has it",
 }
 NAMED = re.compile(r"(?:name|material|mesh|body|joint|link) '([^']+)'")  # in a text of MuJoCo
+XmlElement = etree._Element  # lxml has no public name for its type
 
 
 class ImportRefused(VehicleError):
@@ -94,7 +95,7 @@ def refused_by_mujoco(
     return ImportRefused(f"{where}: {reason}")
 
 
-def tree(file: Path) -> etree._Element:
+def tree(file: Path) -> XmlElement:
     """Return the root of an XML file; raise ImportRefused with the line of an error.
 
     Entities are refused: they can grow without limit and name other files.
@@ -116,7 +117,7 @@ def tree(file: Path) -> etree._Element:
         raise ImportRefused(f"{file} line {error.lineno}: no XML: {said}") from None
 
 
-def kind_of(file: Path, root: etree._Element) -> str:
+def kind_of(file: Path, root: XmlElement) -> str:
     """Return "robot" for a URDF, "mujoco" for an MJCF; raise ImportRefused for another file."""
     name = etree.QName(root).localname
     if "xacro" in "".join(root.nsmap.values()) and _has_xacro(root):
@@ -127,6 +128,6 @@ def kind_of(file: Path, root: etree._Element) -> str:
     raise ImportRefused(f"{file} line {root.sourceline}: <{name}>: URDF or MJCF expected{other}")
 
 
-def _has_xacro(root: etree._Element) -> bool:
+def _has_xacro(root: XmlElement) -> bool:
     tags = (one.tag for one in root.iter() if isinstance(one.tag, str))
     return any("xacro" in tag for tag in tags)

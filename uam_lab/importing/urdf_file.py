@@ -15,6 +15,7 @@ from uam_lab.importing.source import (
     JointFacts,
     RotorFacts,
     Source,
+    XmlElement,
     refused_by_mujoco,
 )
 
@@ -26,13 +27,13 @@ VECTORS = {"origin": ("xyz", "rpy"), "axis": ("xyz",)}
 TENSOR = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
-def read(file: Path, root: etree._Element) -> Source:
+def read(file: Path, root: XmlElement) -> Source:
     """Return the source of a URDF. Raises ImportRefused."""
     return _Urdf(file, root).source()
 
 
 class _Urdf:
-    def __init__(self, file: Path, root: etree._Element) -> None:
+    def __init__(self, file: Path, root: XmlElement) -> None:
         self.file, self.root = file, root
         self.links = self._named("link")
         self.joints = self._named("joint")
@@ -72,17 +73,17 @@ class _Urdf:
             raise refused_by_mujoco(self.file, lines, error) from None
         return Source(self.file, spec, lines, meshes.files, rotors, facts, meshes.notes)
 
-    def where(self, element: etree._Element) -> str:
+    def where(self, element: XmlElement) -> str:
         """Return file and line of an element."""
         return f"{self.file} line {element.sourceline}"
 
-    def error(self, element: etree._Element, text: str) -> ImportRefused:
+    def error(self, element: XmlElement, text: str) -> ImportRefused:
         """Return the refusal of an element."""
         return ImportRefused(f"{self.where(element)}: {text}")
 
-    def _named(self, kind: str) -> dict[str, etree._Element]:
+    def _named(self, kind: str) -> dict[str, XmlElement]:
         """Return name → element of the links or joints."""
-        found: dict[str, etree._Element] = {}
+        found: dict[str, XmlElement] = {}
         for one in self.root.findall(kind):
             name = one.get("name")
             if not name:
@@ -93,7 +94,7 @@ class _Urdf:
             found[name] = one
         return found
 
-    def _numbers(self, one: etree._Element, key: str, count: int) -> list[float]:
+    def _numbers(self, one: XmlElement, key: str, count: int) -> list[float]:
         """Return the finite numbers of an attribute, zeros without it."""
         text = one.get(key)
         try:
@@ -105,7 +106,7 @@ class _Urdf:
             raise self.error(one, f"<{one.tag} {key}={text!r}>: {many} expected")
         return values
 
-    def _check_numbers(self, one: etree._Element) -> None:
+    def _check_numbers(self, one: XmlElement) -> None:
         for key in VECTORS.get(one.tag, ()):
             values = self._numbers(one, key, 3)
             far = max(map(abs, values)) if key == "xyz" and one.tag == "origin" else 0.0
@@ -115,7 +116,7 @@ class _Urdf:
             for key in one.keys():
                 self._numbers(one, key, 1)
 
-    def _check_inertial(self, name: str, link: etree._Element) -> None:
+    def _check_inertial(self, name: str, link: XmlElement) -> None:
         inertial = link.find("inertial")
         if inertial is None:
             return
@@ -134,7 +135,7 @@ class _Urdf:
 
     def _check_tree(self) -> str:
         """Return the name of the only root; raise ImportRefused for another graph than a tree."""
-        above: dict[str, etree._Element] = {}
+        above: dict[str, XmlElement] = {}
         for name, joint in self.joints.items():
             if joint.get("type") not in KINDS:
                 allowed = ", ".join(KINDS)
@@ -171,7 +172,7 @@ class _Urdf:
             yield name
             waiting += children.get(name, ())
 
-    def _check_joint(self, name: str, joint: etree._Element) -> None:
+    def _check_joint(self, name: str, joint: XmlElement) -> None:
         axis, limit = joint.find("axis"), joint.find("limit")
         turns = joint.get("type") in ("revolute", "continuous", "prismatic")
         if turns and axis is not None and not any(self._numbers(axis, "xyz", 3)):
@@ -198,7 +199,7 @@ class _Urdf:
         etree.SubElement(joint, "parent", link=WORLD)
         etree.SubElement(joint, "child", link=root)
 
-    def _facts(self, joint: etree._Element) -> JointFacts:
+    def _facts(self, joint: XmlElement) -> JointFacts:
         limit = joint.find("limit")
         effort = speed = 0.0
         if limit is not None:
@@ -206,7 +207,7 @@ class _Urdf:
         return JointFacts(effort, speed, joint.find("mimic") is not None)
 
 
-def _fill(link: etree._Element) -> None:
+def _fill(link: XmlElement) -> None:
     """Give a frame without mass, and a point mass, the least that MuJoCo accepts."""
     inertial = link.find("inertial")
     if inertial is None:
@@ -221,7 +222,7 @@ def _fill(link: etree._Element) -> None:
             tensor.set(key, f"{LEAST:g}")
 
 
-def _gazebo_rotors(root: etree._Element) -> Iterator[tuple[str, RotorFacts]]:
+def _gazebo_rotors(root: XmlElement) -> Iterator[tuple[str, RotorFacts]]:
     """Yield link or joint and facts of the motor plugins of Gazebo: of RotorS, of PX4."""
     for plugin in root.iter("plugin"):
         texts = {one.tag: (one.text or "").strip() for one in plugin if isinstance(one.tag, str)}
