@@ -16,6 +16,7 @@ from uam_control.control.output_limits import (
     integrate,
     limit_force,
     limit_torque,
+    take_known_load,
     wash_out,
 )
 from uam_control.settings.parameter_set import ParameterError
@@ -98,9 +99,9 @@ def test_the_known_load_takes_the_place_of_the_feedforward(loaded, expected):
     tau, integral = np.array([10.0]), np.array([0.5])
     one, inertia = np.ones(1), np.array([2.0])
     load, acceleration = np.array([3.0]), np.array([4.0])
-    complete_effort(
-        acceleration, 0.0 * one, load, loaded, inertia, one, 9.0, False, 0.1, integral, tau
-    )
+    complete_effort(0.0 * one, inertia, one, 9.0, False, 0.1, integral, tau)
+    if loaded:
+        take_known_load(load, inertia, acceleration, tau)
     np.testing.assert_allclose(tau, expected)
 
 

@@ -18,6 +18,7 @@ from uam_control.control.output_limits import (
     complete_effort,
     lead_attitude,
     limit_torque,
+    take_known_load,
 )
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
@@ -162,13 +163,11 @@ def end_attitude(a: AttitudeArrays) -> None:
 def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Complete the law's torques and limit them; then write goals of the servos if they are due."""
     m, errors, tau = a.all.numbers[0], a.all.errors, a.all.law.tau
+    saturated = m.saturated != 0
+    complete_effort(errors[E, ALPHA:], a.inertia, a.gain, a.limit, saturated, dt, a.integral, tau)
     if a.load.on:
         arm_load(a.load, reference, True)
-    complete_effort(
-        *(errors[FEEDFORWARD, ALPHA:], errors[E, ALPHA:], a.load.torques, a.load.on, a.inertia),
-        *(a.gain,),
-        *(a.limit, m.saturated != 0, dt, a.integral, tau),
-    )
+        take_known_load(a.load.torques, a.inertia, errors[FEEDFORWARD, ALPHA:], tau)
     m.saturated = limit_torque(tau, a.torque_max, a.all.tau)
     if not a.goals:
         return

@@ -303,10 +303,7 @@ def complete_and_limit(
 
 @jit
 def complete_effort(
-    acceleration_d: np.ndarray,
     e: np.ndarray,
-    load: np.ndarray,
-    loaded: bool,
     inertia: np.ndarray,
     gain: np.ndarray,
     limit: float,
@@ -315,14 +312,22 @@ def complete_effort(
     integral: np.ndarray,
     tau: np.ndarray,
 ) -> None:
-    """Add integral action and known load to the law's torques tau (n,) [N m], in place.
+    """Add integral action to the law's torques tau (n,) [N m], in place.
 
-    load (n,) [N m]: used if `loaded`, in place of the law's feedforward, which is inertia (n,)
-    [kg m^2] times acceleration_d (n,) [rad/s^2]. e, gain, limit, saturated, dt, integral: see
-    `integrate`.
+    inertia (n,) [kg m^2]; the others: see `integrate`.
     """
     integrate(e, gain, limit, saturated, dt, integral)
     for i in range(len(tau)):
         tau[i] -= inertia[i] * integral[i]
-        if loaded:
-            tau[i] += load[i] - inertia[i] * acceleration_d[i]
+
+
+@jit
+def take_known_load(
+    load: np.ndarray, inertia: np.ndarray, acceleration_d: np.ndarray, tau: np.ndarray
+) -> None:
+    """Put load (n,) [N m] in the place of the law's feedforward in tau (n,) [N m].
+
+    The feedforward is inertia (n,) [kg m^2] times acceleration_d (n,) [rad/s^2].
+    """
+    for i in range(len(tau)):
+        tau[i] += load[i] - inertia[i] * acceleration_d[i]

@@ -43,7 +43,12 @@ from uam_control.setpoints.setpoint_source import (
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.stages.autopilot_port import AutopilotPort, PortSteps
 from uam_control.stages.autopilot_report import AutopilotReport, AutopilotReports
-from uam_control.stages.flight_measurements import FlightMeasurements, MeasurementArrays, measure
+from uam_control.stages.flight_measurements import (
+    FlightMeasurements,
+    MeasurementArrays,
+    Sent,
+    measure,
+)
 from uam_control.stages.step import ASK, DECIDE, DONE
 from uam_control.stages.supervisor_inputs import LIFT, keep
 from uam_control.stages.vision_pacing import (
@@ -228,17 +233,10 @@ class BridgeStage:
         self._send(now, setpoint)
         airborne = flying and situation.armed
         self.factor = factor = self.map.thrust_factor
-        found = self.measurements.update(
-            now,
-            min(max(stamp - self.last, 0) / SECOND, LONGEST_STEP),
-            state,
-            rates,
-            thrust,
-            airborne and setpoint is not None and not self.source.holding,
-            airborne and not situation.let_go,
-            factor,
-            self.map.curve,
-        )
+        looped = airborne and setpoint is not None and not self.source.holding
+        sent = Sent(rates, thrust, looped, airborne and not situation.let_go, factor)
+        step = min(max(stamp - self.last, 0) / SECOND, LONGEST_STEP)
+        found = self.measurements.update(now, step, state, sent, self.map.curve)
         if found != factor:
             self.map.thrust_factor = found
         self.lift_due = stamp // LIFT_PERIOD != self.last // LIFT_PERIOD
@@ -361,10 +359,8 @@ def sending(port: PortSteps) -> Callable[[tuple], int]:
         a.sent[3] = thrust
         m.factor = factor = a.map[0].factor
         step = min(max(stamp - m.last, 0) / SECOND, LONGEST_STEP)
-        found = measure(
-            *(now, step, s.state, rates, thrust, True, True, factor, a.curve),
-            *(a.measured, a.delay_numbers),
-        )
+        sent = Sent(rates, thrust, True, True, factor)
+        found = measure(now, step, s.state, sent, a.curve, a.measured, a.delay_numbers)
         if found != factor:
             use_factor(a.map, a.flat, found)
         if stamp // LIFT_PERIOD != m.last // LIFT_PERIOD:

@@ -43,36 +43,45 @@ class MeasurementArrays(NamedTuple):
     lift: np.ndarray
 
 
+class Sent(NamedTuple):
+    """What was sent at a tick.
+
+    rates (3,) [rad/s, FLU]; thrust 0..1; looped: whether the laws made the setpoint of a flying
+    vehicle; flown: whether the thrust acts on it; factor: of the thrust, used for the setpoint.
+    """
+
+    rates: np.ndarray
+    thrust: float
+    looped: bool
+    flown: bool
+    factor: float
+
+
 @jit
 def measure(
     now: float,
     step: float,
     state: np.ndarray,
-    rates: np.ndarray,
-    thrust: float,
-    looped: bool,
-    flown: bool,
-    factor: float,
+    sent: Sent,
     curve: tuple[float, float, float, float],
     arrays: MeasurementArrays,
     numbers: DelayNumbers,
 ) -> float:
     """Advance the measurements by one tick; return the new thrust factor.
 
-    now [s]; step [s]: since the last tick, for the lift; state (3, 6 + n); rates (3,) [rad/s, FLU],
-    thrust 0..1: sent at the tick; looped: whether the laws made the setpoint of a flying vehicle;
-    flown: whether the thrust acts on it; factor: used for the setpoint; curve: see
+    now [s]; step [s]: since the last tick, for the lift; state (3, 6 + n); curve: see
     `RateThrustMap.curve`; numbers: of the loop delay.
     """
     sums, record, memory, lift = arrays
-    if looped:
-        follow(now, rates, state[CHI_DOT, ROLL:ALPHA], sums, numbers)
+    thrust = sent.thrust
+    if sent.looped:
+        follow(now, sent.rates, state[CHI_DOT, ROLL:ALPHA], sums, numbers)
     else:
         pause(sums)
     assumed = thrust_of_command(thrust, curve[0], curve[1], curve[2], curve[3])
     gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
-    lift[0] += gain * (factor * assumed - lift[0])
-    flown = flown and math.isfinite(thrust)
+    lift[0] += gain * (sent.factor * assumed - lift[0])
+    flown = sent.flown and math.isfinite(thrust)
     return identify(now, state, thrust, assumed, flown, record, memory)
 
 
@@ -88,7 +97,7 @@ class FlightMeasurements:
         memory = self.identification.record, self.identification.memory
         self.arrays = MeasurementArrays(self.loop_delay.sums, *memory, self._lift)
         self._measure = prepared(
-            *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), np.zeros(3), 0.0, True, True, 1.0),
+            *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), Sent(np.zeros(3), 0.0, True, True, 1.0)),
             *((0.0, 0.0, 0.0, 0.0), self.arrays, self.loop_delay.numbers),
         )
 
@@ -102,17 +111,10 @@ class FlightMeasurements:
         now: float,
         step: float,
         state: np.ndarray,
-        rates: np.ndarray,
-        thrust: float,
-        looped: bool,
-        flown: bool,
-        factor: float,
+        sent: Sent,
         curve: tuple[float, float, float, float],
     ) -> float:
         """Take a tick and return the new thrust factor; see `measure`."""
         if self.identification.magnet_waits:
-            self.identification.follow_magnet(now, math.isfinite(now + thrust))
-        return self._measure(
-            *(now, step, state, rates, thrust, looped, flown, factor, curve),
-            *(self.arrays, self.loop_delay.numbers),
-        )
+            self.identification.follow_magnet(now, math.isfinite(now + sent.thrust))
+        return self._measure(now, step, state, sent, curve, self.arrays, self.loop_delay.numbers)
