@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.interface import CONTENTS, Content
 from uam_msgs_py.messages.serialized import type_name
-from uam_msgs_py.node.wiring import WIRES, Wire
 
 PAGE = Path(__file__).with_name("interfaces.md")
 BEGIN, END = "<!-- made by docs/make_interfaces.py -->\n", "<!-- end -->\n"
@@ -16,9 +14,7 @@ HEAD = ("topic", "type", "QoS", "frame", "unit", "rate", "publisher", "who needs
 
 def table() -> str:
     """Return the table of all topics in Markdown, in the order of `topics`."""
-    wires = {wire.topic: wire for wire in WIRES}
-    rows = [_row(topic, CONTENTS[topic], wires.get(topic)) for topic in topics.ALL]
-    lines = [HEAD, ("---",) * len(HEAD), *rows]
+    lines = [HEAD, ("---",) * len(HEAD), *map(_row, topics.ALL)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
@@ -28,20 +24,18 @@ def page(text: str) -> str:
     return before + BEGIN + table() + END + rest.split(END)[1]
 
 
-def _row(topic: topics.Topic, content: Content, wire: Wire | None) -> tuple[str, ...]:
-    publisher, readers = content.publisher, content.readers
-    if wire is not None:
-        publisher = wire.publisher
-        readers = ", ".join(wire.subscribers) or "recorder"
-        readers += " (optional)" if wire.optional else ""
+def _row(topic: topics.Topic) -> tuple[str, ...]:
+    readers = topic.readers
+    if topic.to is not None:
+        readers = (", ".join(topic.to) or "recorder") + topic.optional * " (optional)"
     return (
         f"`/{topic.name.removeprefix('/')}`",
         type_name(topic.type).replace("/msg/", "/"),
         _qos(topic),
-        content.frame,
-        content.unit,
-        content.rate,
-        publisher if topic.one_publisher else f"{publisher} (several allowed)",
+        topic.frame,
+        topic.unit,
+        topic.rate,
+        topic.publisher + (not topic.one_publisher) * " (several allowed)",
         readers,
     )
 

@@ -21,7 +21,6 @@ from uam_lab.records.results import timeseries
 from uam_lab.records.results.metrics import errors
 from uam_lab.records.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.interface import CONTENTS
 from uam_sim_bridge.plant import Vehicle
 
 WALL = ("wall_s", "real_time_factor")  # what may differ between two runs of one flight
@@ -136,7 +135,7 @@ def test_the_result_folder_is_a_bag_for_rosbags(shared_flights):
 
 
 def test_rates_and_frames_are_those_of_the_interface_table(shared_flights):
-    """docs/interfaces.md is made from these CONTENTS."""
+    """docs/interfaces.md is made from this table."""
     with AnyReader([shared_flights.single.out]) as reader:
         span = (reader.end_time - reader.start_time) * 1e-9
         counts = {c.topic: c.msgcount for c in reader.connections}
@@ -147,15 +146,15 @@ def test_rates_and_frames_are_those_of_the_interface_table(shared_flights):
                 frames[connection.topic] = header.frame_id if header else ""
     counts = {name.removeprefix("/"): count for name, count in counts.items()}
     frames = {name.removeprefix("/"): frame for name, frame in frames.items()}
-    for topic, content in CONTENTS.items():
-        if found := re.fullmatch(r"(\d+) Hz", content.rate):
+    for topic in topics.ALL:
+        if found := re.fullmatch(r"(\d+) Hz", topic.rate):
             if topic is not topics.ARM_TEMPERATURE:  # no servo driver in a simulation
                 share = counts[topic.name.removeprefix("/")] / span / float(found[1])
                 # the scene is no part of the lockstep: on a busy machine it leaves out frames
                 least = 0.1 if topic in (topics.TF, topics.TRACKING_ERROR) else 0.9
                 assert least < share < 1.1, topic.name
     for topic in (topics.IMU, topics.MOCAP, topics.STATE, topics.REFERENCE, topics.SETPOINT):
-        assert frames[topic.name] == CONTENTS[topic].frame
+        assert frames[topic.name] == topic.frame
 
 
 def test_messages_without_a_stamp_lie_at_their_tick(shared_flights):

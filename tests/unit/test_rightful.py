@@ -50,7 +50,7 @@ def test_the_parameter_names_others(given, topic, expected):
 @pytest.mark.parametrize(
     "given, complaint",
     [
-        ("misson=a", "'misson' is none of the nodes mujoco_sim, .*and topics imu/data, "),
+        ("misson=a", "'misson' is none of the nodes mujoco_sim, .*and topics clock, imu/data, "),
         ("mission", "'mission'; allowed: NODE=NAME or TOPIC=NAME"),
         ("mission=my planner", "'mission=my planner'; allowed"),
         ("mission=", "'mission='; allowed"),

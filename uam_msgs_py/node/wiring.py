@@ -1,8 +1,8 @@
 """Publishers and subscribers of each topic in a flight.
 
 A lockstep flight is reproducible only if no node misses its first tick. The plant therefore waits
-until both ends of every connection listed here report it. A test compares the list with the
-running nodes.
+until both ends of every wire report it: of each topic of the table with nodes that need it. A test
+compares them with the running nodes.
 """
 
 from __future__ import annotations
@@ -15,19 +15,27 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.node_names import (  # noqa: F401  for all that speak of wires
+    ARM,
+    ARM_DRIVER,
+    ATTITUDE,
+    BRIDGE,
+    CHECKLIST,
+    COCKPIT,
+    ESTIMATOR,
+    FLIGHT,
+    FLIGHT_CONTROLLER,
+    FUSED,
+    MAGNET_DRIVER,
+    MISSION,
+    MOCAP_DRIVER,
+    PLANT,
+    POSITION,
+    RECORDER,
+    SCENE,
+)
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 from uam_msgs_py.node.namespace import expanded
-
-ESTIMATOR, MISSION = "state_estimator", "mission"
-POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
-BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
-MOCAP_DRIVER, ARM_DRIVER, MAGNET_DRIVER = "mocap_driver", "arm_driver", "magnet_driver"
-SCENE, COCKPIT = "scene", "cockpit"  # observers, in none of WIRES: a flight starts without them
-CHECKLIST = "checklist"  # of a real vehicle only
-# Nodes that one process may have, in the order in which they act in a tick; and its own node
-FUSED = (ESTIMATOR, MISSION, POSITION, ATTITUDE, ARM, BRIDGE)
-FLIGHT_CONTROLLER = "flight_controller"
-FLIGHT = "uam_fly"  # the node of `uam fly` itself
 
 
 @dataclass(frozen=True)
@@ -47,35 +55,10 @@ class Wire:
         return (*self.subscribers, RECORDER) if recorded else self.subscribers
 
 
-WIRES = (
-    Wire(topics.IMU, PLANT, (ESTIMATOR,)),
-    Wire(topics.JOINTS, PLANT, (ESTIMATOR, MISSION)),
-    Wire(topics.MOCAP, PLANT, (ESTIMATOR, MISSION, BRIDGE)),
-    Wire(topics.STATE, ESTIMATOR, (MISSION, POSITION, ATTITUDE, ARM, BRIDGE)),
-    Wire(topics.REFERENCE, MISSION, (POSITION, ATTITUDE, ARM)),
-    Wire(topics.MAGNET, MISSION, (PLANT,)),
-    Wire(topics.ARMING, MISSION, (BRIDGE,)),
-    Wire(topics.MISSION_STATUS, MISSION, (PLANT, BRIDGE)),
-    Wire(topics.POSITION_COMMAND, POSITION, (ATTITUDE, ARM, BRIDGE, MISSION)),
-    Wire(topics.ATTITUDE_COMMAND, ATTITUDE, (BRIDGE,)),
-    Wire(topics.ARM_EFFORT, ARM, (PLANT,)),
-    Wire(topics.ARM_GOALS, ARM, (PLANT,), optional=True),
-    Wire(topics.SETPOINT, BRIDGE, (PLANT,)),
-    Wire(topics.AUTOPILOT_STATE, BRIDGE, (MISSION, ATTITUDE)),
-    Wire(topics.AUTOPILOT_BATTERY, BRIDGE, (MISSION,), optional=True),
-    Wire(topics.POSITION_ADAPTATION, POSITION, (MISSION,), optional=True),
-    Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE, (MISSION,), optional=True),
-    Wire(topics.ARM_ADAPTATION, ARM, (MISSION,), optional=True),
-    Wire(topics.THRUST, BRIDGE, (MISSION,), optional=True),
-    Wire(topics.PAYLOAD, PLANT, (MISSION,), optional=True),
-    Wire(topics.IMU_BIAS, ESTIMATOR, (MISSION,), optional=True),
-    # only recorded
-    Wire(topics.CLOCK, PLANT),
-    Wire(topics.TRUTH_STATE, PLANT),
-    Wire(topics.TRUTH_PAYLOAD, PLANT),
-    Wire(topics.TRUTH_ROTORS, PLANT),
-    Wire(topics.TRUTH_MAGNET, PLANT),
-    Wire(topics.ARM_COMMAND, ARM),
+WIRES = tuple(
+    Wire(topic, topic.publisher, topic.to, topic.optional)
+    for topic in topics.ALL
+    if topic.to is not None
 )
 
 
