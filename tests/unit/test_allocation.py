@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.setpoints.rotor_geometry import normalised_mixer, torque_scale
+from uam_control.vehicle.rotor_geometry import normalised_mixer, torque_scale
 from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
 
 PX = np.array([0.171, -0.171, 0.171, -0.171])

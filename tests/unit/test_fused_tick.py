@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from uam_control.coordinates import coordinates
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_pose
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -44,7 +44,15 @@ class FakeNode:
         self.rightful = RightfulNodes("/", publishers)
         self.outlets = self._ends(lambda wire: wire.publisher == name)
         self.inlets = self._ends(lambda wire: name in wire.subscribers)
-        self.errors, self.vehicle = self, self
+        self.errors, self.vehicle, self.poses = self, self, self
+        self.topic, self.read = topics.MOCAP, read_pose  # of the poses
+
+    def reads_odometry(self):
+        self.topic, self.read = topics.ODOMETRY_IN, lambda message: message
+        if topics.MOCAP.name in self.inlets:
+            self.inlets[self.topic.name] = End(f"/{self.topic.name}")
+            del self.inlets[topics.MOCAP.name]
+        return self
 
     def _ends(self, has):
         names = [wire.topic.name for wire in wiring.WIRES if has(wire)]
@@ -110,13 +118,15 @@ def nodes(log=None, **publishers):
 class Process:
     """A fused tick on the stages of a control tick, and what is published to it."""
 
-    def __init__(self):
+    def __init__(self, change=lambda node: None):
+        """change: is called with each node before they join."""
         self.log, rig = [], Rig()
         control, self.angles = rig.control, rig.angles
         self.port, every = rig.port, nodes(self.log)
         stages = control.estimator, control.mission, *control.laws.values(), control.bridge
         for node, stage in zip(every.values(), stages, strict=True):
             node.stage, node.joint_names = stage, ("alpha_1", "alpha_2")
+            change(node)
         every[wiring.ARM].hand = control.hand
         self.every, own = every, FakeNode(wiring.FLIGHT_CONTROLLER, self.log)
         self.fused = FusedTick(own, every)
@@ -200,6 +210,18 @@ def test_a_process_is_whole_with_all_nodes_that_read_each_other():
     changed = nodes()
     changed[wiring.ARM] = FakeNode(wiring.ARM, [], remapped=[(topics.STATE.name, "mine")])
     assert not is_whole(changed)
+    odometry = {name: node.reads_odometry() for name, node in nodes().items()}
+    assert is_whole(odometry)
+    assert not is_whole(odometry | {wiring.BRIDGE: nodes()[wiring.BRIDGE]})
+
+
+def test_the_poses_are_those_that_the_estimator_reads():
+    process = Process(lambda node: node.reads_odometry())
+    read = []
+    process.every[wiring.ESTIMATOR].note_pose = read.append
+    process.hear(topics.ODOMETRY_IN, (7, LOW, LEVEL))
+    assert read == [7] and topics.MOCAP not in process.every[wiring.ESTIMATOR].handles
+    assert process.every[wiring.BRIDGE].handles[topics.ODOMETRY_IN](b"not read again") is None
 
 
 @given(rate=st.floats(1.0, 1000.0), steps=st.lists(st.integers(1, 20), min_size=1, max_size=60))

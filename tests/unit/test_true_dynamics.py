@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from designing import vehicles
 
 from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import load_description
 from uam_lab.analysis import dynamics, supply, ticks
 from uam_lab.analysis.dynamics import Body
 from uam_sim_bridge.plant import Vehicle
@@ -50,6 +52,18 @@ def test_a_held_payload_is_part_of_the_arm():
     assert (held[0] - without[0])[0, 0] == pytest.approx(0.3)
     assert (held[2] - without[2])[2] == pytest.approx(0.3 * G)
     assert (held[2] - without[2])[6] == pytest.approx(0.3 * G * (0.10 + 0.14 + 0.05))
+
+
+def test_a_magnet_hangs_below_a_turned_arm(tmp_path):
+    """A pitch joint and a nose-down base turn the hinge about its axis, a yaw joint does not."""
+    file = vehicles.write(vehicles.Made("turned", 1.0, 4, 0.16, 0.02, 2, axes="zy"), tmp_path)
+    body = Body(Vehicle.of(load_description(file)))
+    for chi, angle in (
+        ([0, 0, 1, 0, 0, 0, 1.9, 1.2], -1.2),
+        ([0, 0, 1, 0, 0.3, 0, 0.0, 1.2], 0.3 - 1.2),
+    ):
+        body.place(np.array(chi, float))
+        assert body.data.qpos[body.size + 1] == pytest.approx(angle)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,11 +13,11 @@ from uam_control.mission import load_scenario
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
-from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, chain_of, derived_parameters, load_description
 from uam_control.vehicle.loading import HOVERS, describe
+from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_lab.analysis import dynamics, supply
 from uam_lab.records.results.timeseries import Series, columns_of
 from uam_sim_bridge.autopilot.params import DEFINITIONS, Parameters
@@ -104,6 +104,7 @@ def test_what_the_model_is_made_of():
         ((("rotors", "efficiency"), [1.0]), "rotors.efficiency: a list of 4 numbers expected"),
         ((("rotors", "layout"), []), "rotors.layout: a list of mappings expected"),
         ((("rotors", "layout", 1, "direction"), "left"), "layout[1].direction: 'left' is not one"),
+        ((("rotors", "layout", 1, "position"), [0.171, -0.171, 0.05]), "roll, pitch, yaw and thr"),
         ((("rotors", "layout", 1, "name"), "rotor_1"), "rotor_1: the name of several parts"),
         ((("rotors", "layout", 1, "position"), [0, 0]), "position: a list of 3 numbers expected"),
         ((("joints", 0, "range_deg"), [0, 11]), "[0, 11] is less than 11.5 deg wide"),

@@ -43,7 +43,6 @@ from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
-from uam_control.setpoints.rotor_geometry import torque_scale
 from uam_control.setpoints.thrust_curve import (
     command_of_thrust,
     curve,
@@ -52,6 +51,7 @@ from uam_control.setpoints.thrust_curve import (
 )
 from uam_control.settings.parameter_set import number, vector
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
+from uam_control.vehicle.rotor_geometry import torque_scale
 
 # entries of the flat parameter array of the compiled map
 (_FULL, _BATTERY, _MOTOR, _MODEL, _MIN, _MAX, _COMMAND_MAX, _GAIN, _LIMIT) = (

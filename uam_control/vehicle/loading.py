@@ -18,6 +18,7 @@ from uam_control.vehicle.description import (
     VehicleDescription,
 )
 from uam_control.vehicle.plant_numbers import check_plant_numbers
+from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_control.vehicle.servo_types import merged, servo_types
 
 DEFAULT_VEHICLE = "s500_arm"
@@ -158,6 +159,10 @@ def _check_rotors(described: VehicleDescription, rotor: Section) -> None:
     count = len(described.rotors)
     if not 4 <= count <= 12:
         raise VehicleError(f"{rotor.where}.layout: {count} rotors; 4 to 12 are possible")
+    try:
+        normalised_mixer(*described.geometry())
+    except ValueError as error:
+        raise VehicleError(f"{rotor.where}.layout: {error}") from None
     rotor.numbers("efficiency", count)
 
 

@@ -16,6 +16,7 @@ reflected inertia of the servos (armature). Friction, drag and contacts are not 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -82,8 +83,11 @@ class Body:
         self.data.qpos[model.joint(PAYLOAD).qposadr[0]] = 50.0
         self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
-    def place(self, chi: np.ndarray, swing: float) -> None:
-        """Set the pose: chi (6 + n,) [m, world; rad, Euler angles; rad, joints], pivot [rad]."""
+    def place(self, chi: np.ndarray, swing: float = math.nan) -> None:
+        """Set the pose: chi (6 + n,) [m, world; rad, Euler angles; rad, joints], pivot [rad].
+
+        NaN: the pivot hangs.
+        """
         qpos = self.data.qpos
         qpos[0:3] = chi[POSITION]
         half = 0.5 * chi[ATTITUDE]
@@ -94,7 +98,17 @@ class Body:
         qpos[6] = cr * cp * sy - sr * sp * cy
         qpos[7 : self.size + 1] = chi[ALPHA:]
         if self.pivot:
-            qpos[self.size + 1] = swing
+            qpos[self.size + 1] = self._hanging() if math.isnan(swing) else swing
+
+    def _hanging(self) -> float:
+        """Return the angle [rad] of the pivot at rest: its weight's moment is a sine of it."""
+        moments = []
+        self.data.qvel[:] = 0.0
+        for angle in (0.0, 0.5 * math.pi):
+            self.data.qpos[self.size + 1] = angle
+            mujoco.mj_forward(self.model, self.data)
+            moments.append(self.data.qfrc_bias[self.size])
+        return math.atan2(-moments[0], moments[1])
 
     def evaluate(
         self,
@@ -109,7 +123,7 @@ class Body:
         """Write M (6 + n, 6 + n), C chi_dot, g and pivot force (6 + n,) of a state into the last 4.
 
         chi, chi_dot (6 + n,): SI units, position in the world, body rates in FLU. swing (3,): angle
-        [rad], rate, acceleration of the pivot. Units of the results: see `Dynamics`.
+        [rad], rate, acceleration of the pivot, see `place`. Units of the results: see `Dynamics`.
         """
         model, data, size = self.model, self.data, self.size
         self.place(chi, swing[0])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from uam_control.setpoints.rotor_geometry import effectiveness
+from uam_control.vehicle.rotor_geometry import effectiveness
 from uam_lab.importing.source import RotorFacts, Source, place
 
 NAMES = (r"rotor", r"prop(eller)?(?!rio)", r"motor|thrust")

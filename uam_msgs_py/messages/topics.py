@@ -125,7 +125,7 @@ MOCAP = Topic("vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, WORLD, POSE, CAME
     to=(ESTIMATOR, MISSION, BRIDGE), about="motion capture, world")
 ODOMETRY_IN = Topic("odometry/in", Odometry, SENSOR_DATA, "world, map or odom", POSE,
     "30 to 360 Hz", "mujoco_sim or your driver",
-    readers="state_estimator, mission, mavlink_bridge", one_publisher=False,
+    readers="state_estimator, mission, mavlink_bridge",
     about="poses of an odometry in place of the motion capture (`pose_source: odometry`)")
 PAYLOAD = Topic("vrpn_mocap/payload/pose", PoseStamped, SENSOR_DATA, WORLD, POSE, CAMERAS, PLANT,
     to=(MISSION,), optional=True,

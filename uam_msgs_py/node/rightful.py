@@ -26,6 +26,7 @@ from uam_msgs_py.node.node_parameters import declared_text
 
 PARAMETER, ANY = "publishers", "any"
 PUBLISHERS = {wire.topic.name: wire.publisher for wire in wiring.WIRES} | {
+    topics.ODOMETRY_IN.name: wiring.PLANT,
     topics.PREFLIGHT.name: wiring.MISSION,
     topics.CHECKLIST.name: wiring.CHECKLIST,
     topics.RECORDED_UNTIL.name: wiring.RECORDER,

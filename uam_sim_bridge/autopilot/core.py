@@ -28,10 +28,10 @@ from uam_control.setpoints.attitude_target import (
 )
 from uam_control.setpoints.kinds.desired import Target
 from uam_control.setpoints.position_target import PositionTarget
-from uam_control.setpoints.rotor_geometry import normalised_mixer
 from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_control.vehicle import load_description
+from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import (
     POSITION,

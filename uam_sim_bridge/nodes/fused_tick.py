@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from rclpy.subscription import Subscription
@@ -31,7 +32,7 @@ from uam_msgs_py.node.tick_times import DECODE, STAGE
 Run = Callable[[ControlTick], bool]
 INNER = [wire for wire in wiring.WIRES if wire.publisher in wiring.FUSED]
 AS_MESSAGES = topics.AUTOPILOT_BATTERY, topics.MAGNET  # no signals of the tick
-SENSORS = topics.MOCAP, topics.JOINTS, topics.IMU, topics.PAYLOAD
+SENSORS = topics.JOINTS, topics.IMU, topics.PAYLOAD  # and the poses, see `_read_wires`
 
 
 def is_whole(nodes: Mapping[str, UamNode]) -> bool:
@@ -45,23 +46,28 @@ def is_whole(nodes: Mapping[str, UamNode]) -> bool:
         publisher = nodes[wire.publisher]
         own = full_name(publisher.get_namespace(), publisher.get_name())
         sent = publisher.resolve_topic_name(wire.topic.name)
-        if _sources(nodes, wire) - {(own, sent)}:
+        if _sources(nodes, wire) - {(own, sent), None}:
             return False
-    return all(len(_sources(nodes, wire)) == 1 for wire in _read_wires())
+    read = [_sources(nodes, wire) for wire in _read_wires(nodes[wiring.ESTIMATOR].poses.topic)]
+    return all(len(one) == 1 and None not in one for one in read)
 
 
-def _read_wires() -> list[wiring.Wire]:
-    return [wire for wire in wiring.WIRES if wire.topic in SENSORS]
+def _read_wires(poses: topics.Topic) -> list[wiring.Wire]:
+    """Return the wires of the sensors; poses: topic of the estimator's poses."""
+    wires = wiring.WIRES if poses == topics.MOCAP else wiring.with_odometry(wiring.WIRES)
+    return [wire for wire in wires if wire.topic in (poses, *SENSORS)]
 
 
-def _sources(nodes: Mapping[str, UamNode], wire: wiring.Wire) -> set[tuple[str, str]]:
-    """Return the names of publisher and topic that the nodes read a wire's topic from."""
+def _sources(nodes: Mapping[str, UamNode], wire: wiring.Wire) -> set[tuple[str, str] | None]:
+    """Return the names of publisher and topic that the nodes read a wire's topic from.
+
+    None: a node does not read it.
+    """
     name = wire.topic.name
     readers = [nodes[one] for one in wire.subscribers if one in nodes]
     return {
-        (node.rightful.of(name).name, node.inlets[name].topic_name)
+        (node.rightful.of(name).name, node.inlets[name].topic_name) if name in node.inlets else None
         for node in readers
-        if name in node.inlets
     }
 
 
@@ -115,11 +121,12 @@ class FusedTick:
     def _listen(self) -> None:
         """Read each sensor once, and no topic whose content is a signal."""
         signals = [wire for wire in INNER if wire.topic not in AS_MESSAGES]
-        for wire in (*signals, *_read_wires()):
+        poses = self._estimator.poses
+        for wire in (*signals, *_read_wires(poses.topic)):
             for name in self._nodes.keys() & set(wire.subscribers):
                 self._nodes[name].handle_by(wire.topic, lambda message: None)
         readers = {
-            topics.MOCAP: (self._estimator, self._on_mocap),
+            poses.topic: (self._estimator, self._on_pose),
             topics.JOINTS: (self._estimator, self._on_joints),
             topics.PAYLOAD: (self._mission, self._on_payload),
             topics.IMU: (self._estimator, lambda data: self._samples.append(read_imu(data))),
@@ -130,8 +137,8 @@ class FusedTick:
             (node, node.inlets[topic.name]) for topic, (node, _) in readers.items()
         )
 
-    def _on_mocap(self, data: bytes) -> None:
-        pose = read_pose(data)
+    def _on_pose(self, message: Any) -> None:
+        pose = self._estimator.poses.read(message)
         self._estimator.note_pose(pose[0])
         self._tick.tick(mocap=pose)
 

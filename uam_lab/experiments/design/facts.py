@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_control.setpoints.rotor_geometry import YAW, effectiveness, torque_scale
 from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle.rotor_geometry import YAW, effectiveness, torque_scale
 from uam_lab.analysis.dynamics import Body
 from uam_sim_bridge.autopilot.loops.rate_control import (
     LIMIT,
@@ -105,7 +105,7 @@ def inertia_at(body: Body, arm: tuple[float, ...]) -> np.ndarray:
     chi = np.zeros(body.size)
     chi[ARM] = arm
     mass = np.zeros((body.size, body.size))
-    body.evaluate(chi, 0.0 * chi, np.array([-sum(arm), 0.0, 0.0]), mass, *np.zeros((3, body.size)))
+    body.evaluate(chi, 0.0 * chi, np.array([math.nan, 0.0, 0.0]), mass, *np.zeros((3, body.size)))
     across = mass[ATTITUDE, POSITION] @ np.linalg.solve(
         mass[POSITION, POSITION], mass[POSITION, ATTITUDE]
     )

@@ -93,7 +93,7 @@ def rigid_bodies(
     actuators = [model.actuator(name).id for name in body.rotor_names]
     first = max(actuators) + 1
     actuators += range(first, first + joints)
-    body.place(chi, -float(np.sum(arm)))
+    body.place(chi)
     data.qvel[:] = data.ctrl[:] = 0.0
     start = data.qpos.copy()
 

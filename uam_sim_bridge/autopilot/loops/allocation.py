@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.maths.compiled import jit
-from uam_control.setpoints.rotor_geometry import PITCH, ROLL, THRUST, YAW
+from uam_control.vehicle.rotor_geometry import PITCH, ROLL, THRUST, YAW
 
 YAW_MARGIN = 0.15  # of the motor range, kept for yaw at full thrust (PX4: minimum yaw margin)
 WEAK = 0.2  # mixer entries below this do not desaturate (PX4)
