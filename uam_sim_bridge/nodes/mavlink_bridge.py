@@ -35,7 +35,7 @@ from uam_control.setpoints.thrust_identification import ThrustIdentificationPara
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
-from uam_control.stages.flight_measurements import FlightMeasurements
+from uam_control.stages.flight_measurements import FlightMeasurements, Sent
 from uam_control.stages.vision_pacing import VisionParameters
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
@@ -394,7 +394,7 @@ class MavlinkBridgeNode(UamNode):
         measured = FlightMeasurements(
             ThrustIdentificationParameters.of(self._vehicle), self._vehicle
         )
-        measured.update(0.0, 0.004, state, zero, 0.5, True, False, 1.0, spare.curve)
+        measured.update(0.0, 0.004, state, Sent(zero, 0.5, True, False, 1.0), spare.curve)
         measured.loop_delay.pause()
         vision_message(VisionPose(0.0, zero, level, 1.0, 1.0))
 
