@@ -43,6 +43,12 @@ class HandStage:
         self._steer = bound(steer, self.arrays, rows, rows, True, True)
         self.configure(parameters)
 
+    @property
+    def steers(self) -> bool:
+        """Whether the arm stabilises a hand in flight."""
+        numbers = self.arrays.numbers[0]
+        return bool(numbers.has_hand != 0 and numbers.bandwidth > 0.0)
+
     def configure(self, parameters: HandParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
         numbers = self.arrays.numbers

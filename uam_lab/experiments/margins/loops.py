@@ -6,6 +6,7 @@
 | x, y, z | estimated position and velocity, before the position law |
 | joints | estimated angle and velocity, before the arm law |
 | setpoints | the four values of the setpoint together: delay margin only |
+| hand | the correction of the arm's reference, if the hand is stabilised: delay margin only |
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 from uam_control.coordinates import ARM, POSITION
 from uam_lab.experiments.margins.linear import IN, LinearBlock, join
 from uam_lab.experiments.margins.margins import TINY, Margins, common_delay, margins
-from uam_lab.experiments.margins.stack_model import RATES, THRUST, Stack
+from uam_lab.experiments.margins.stack_model import RATES, THRUST, Stack, hand_signals
 
 LOWEST, FREQUENCIES = 0.05, 1200  # [rad/s] and number, up to half the tick rate
 GROWTH = 1e-3  # [1/s] of a mode that counts as unstable
@@ -51,13 +52,15 @@ class Analysis:
     """Margins of all loops of a stack at one operating point.
 
     omega (k,) [rad/s]; loops: name → L (k,), margins; setpoint_delay [s]: by which the whole
-    setpoint may come later; mode: the fastest-growing one; closed: the closed system, with inputs
-    IN + signal that are added.
+    setpoint may come later; hand_delay [s]: by which the correction of the hand may, None: it is
+    off; mode: the fastest-growing one; closed: the closed system, with inputs IN + signal that are
+    added.
     """
 
     omega: np.ndarray
     loops: dict[str, tuple[np.ndarray, Margins]]
     setpoint_delay: float
+    hand_delay: float | None
     mode: GrowingMode
     closed: LinearBlock
 
@@ -77,7 +80,9 @@ def loops_of(coordinates: Sequence[str]) -> tuple[Loop, ...]:
 def analyse(stack: Stack) -> Analysis:
     """Return the margins of all loops of the stack."""
     loops = loops_of(stack.coordinates)
-    signals = [*dict.fromkeys(s for loop in loops for s in loop.signals), THRUST]
+    driven = {name for block in stack.blocks for name in block.outputs}
+    hand = [name for name in hand_signals(stack.coordinates[ARM]) if name in driven]
+    signals = [*dict.fromkeys(s for loop in loops for s in loop.signals), THRUST, *hand]
     steps = [f"state.{name}" for name in stack.coordinates]
     added = list(dict.fromkeys(signals + steps))
     whole = join(stack.blocks, added=added)
@@ -102,6 +107,7 @@ def analyse(stack: Stack) -> Analysis:
         omega,
         found,
         common_delay(omega, opened((*RATES, THRUST))),
+        common_delay(omega, opened(hand)) if hand else None,
         fastest_mode(stack),
         whole.only([IN + name for name in added], whole.outputs),
     )

@@ -70,7 +70,9 @@ def _rows(found: Analysis) -> Iterator[list[str]]:
         gain = f"{_text(m.gain, 1)} / -{_text(m.gain_down, 1)}"
         row = [name, _text(m.crossover, 2), _text(m.bandwidth, 2), _text(m.phase, 1), gain]
         yield [*row, _text(1e3 * m.delay, 1), _text(m.peak, 2)]
-    yield ["all setpoints", "", "", "", "", _text(1e3 * found.setpoint_delay, 1), ""]
+    for name, delay in (("all setpoints", found.setpoint_delay), ("hand", found.hand_delay)):
+        if delay is not None:
+            yield [name, "", "", "", "", _text(1e3 * delay, 1), ""]
 
 
 def document(cases: Sequence[Case], facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -83,6 +85,7 @@ def document(cases: Sequence[Case], facts: Mapping[str, Any]) -> dict[str, Any]:
             "fastest_mode_without_friction": case.sliding._asdict(),
             "rho": case.rho,
             "setpoint_delay_s": case.analysis.setpoint_delay,
+            "hand_delay_s": case.analysis.hand_delay,
             "loops": {name: asdict(m) for name, (_, m) in case.analysis.loops.items()},
         }
         for case in cases

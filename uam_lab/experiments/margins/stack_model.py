@@ -5,6 +5,7 @@
 | IMU, joints: latency | numbers of the vehicle |
 | estimate of base | exact: IMU and motion capture agree (`estimator_margin` for the rest) |
 | estimate of joints | `StateEstimator.joints` |
+| hand: correction of the arm's reference | `HandStage`, faded in; only with a `hand_bandwidth` |
 | laws, desired attitude, map to body rates and thrust | stages of `ControlTick`, `RateThrustMap` |
 | rate loop, allocation | `Autopilot.rate_loop` |
 | rotors, rigid bodies, servos | `plant_model` |
@@ -17,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from uam_control.control.hand_steering import FADE
 from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
@@ -61,7 +63,8 @@ def stack_model(
     described, numbers = vehicle.description, vehicle.numbers
     scenario = load_scenario("hover", described)
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)
-    plant, hover = plant_model(vehicle, payload_mass, described.stowed if arm is None else arm, dry)
+    posture = described.stowed if arm is None else arm
+    plant, hover = plant_model(vehicle, payload_mass, posture, dry)
     names = described.coordinates
     base = tuple(f"{name}{end}" for end in ("", "_dot") for name in names[: ARM.start])
     sensors = numbers["sensors"]
@@ -69,6 +72,7 @@ def stack_model(
         plant,
         delay(_of("true", base), _of("state", base), sensors["imu"]["latency_ticks"]),
         *_joints(flight, names[ARM], sensors["joints"]["latency_ticks"]),
+        *_hand(flight, names, posture),
         _laws(flight, names, hover, gains or {}),
         delay((*RATES, THRUST), _of("arrived", (*RATES, THRUST)), late_setpoints),
         _autopilot(flight, hover),
@@ -98,15 +102,44 @@ def _joints(flight: DirectFlight, names: Sequence[str], latency: int) -> tuple[L
     return delay(_of("true", both), _of("read", both), latency), block
 
 
+def hand_signals(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the corrections of the joints and their rates; names: of the joints."""
+    return _of("hand", (*names, *(f"{name}_dot" for name in names)))
+
+
+def _hand(
+    flight: DirectFlight, names: Sequence[str], posture: Sequence[float]
+) -> tuple[LinearBlock, ...]:
+    """Return the stabilisation of the hand: base → correction of the arm's reference; or none."""
+    hand = flight.control.hand
+    if not hand.steers:
+        return ()
+    base, joints, size = names[: ARM.start], names[ARM], len(names)
+    reference, state = np.zeros((3, size)), np.zeros((3, size))
+    reference[CHI, ARM] = posture
+
+    def step(given: np.ndarray) -> np.ndarray:
+        state[CHI, : ARM.start] = given
+        return (hand.update(state, reference, True, False) - reference)[:CHI_DDOT, ARM].ravel()
+
+    for _ in range(round(2.0 * FADE / flight.plant.period)):
+        step(np.zeros(len(base)))
+    return (linearise(step, [hand], _of("state", base), hand_signals(joints)),)
+
+
 def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains) -> LinearBlock:
     """Return the three laws and the map: state → setpoint, effort."""
     control, signals, size = flight.control, flight.control.signals, len(names)
     signals.flying, weight = True, hover.weight
     period = round(flight.plant.period * 1e9)
+    corrections = hand_signals(names[ARM]) if control.hand.steers else ()
+    steered = control.hand.arrays.reference[:CHI_DDOT, ARM]
 
     def step(given: np.ndarray) -> np.ndarray:
+        given, correction = given[: 2 * size], given[2 * size :]
         signals.stamp += period
         signals.state[CHI], signals.state[CHI_DOT] = given[:size], given[size:]
+        steered[:] = correction.reshape(2, -1) if len(correction) else 0.0
         control_position(control)
         control_attitude(control)
         control_arm(control)
@@ -115,7 +148,7 @@ def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains
         )
         return np.concatenate([rates, [thrust], signals.tau_alpha])
 
-    still = np.zeros(2 * size)
+    still = np.zeros(2 * size + len(corrections))
     step(still)
     # thrust of the operating point: the payload's weight as desired acceleration
     signals.reference[CHI_DDOT, Z] = (weight - signals.tau_p[2]) * (
@@ -125,7 +158,7 @@ def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains
         control.laws[subsystem].controller.law.adaptation[: len(values)] = values
     step(still)
     laws = [stage.controller for stage in control.laws.values()]
-    inputs = _of("state", (*names, *(f"{name}_dot" for name in names)))
+    inputs = (*_of("state", (*names, *(f"{name}_dot" for name in names))), *corrections)
     outputs = (*RATES, THRUST, *_of("effort", names[ARM]))
     return linearise(step, laws, inputs, outputs)
 
