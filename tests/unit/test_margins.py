@@ -8,7 +8,7 @@ import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import low_pass_step
-from uam_control.profiles.profile import default_profile
+from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
 from uam_lab.cli.margins import verdict
@@ -212,6 +212,21 @@ def test_analysis_of_the_profile(vehicle):
     assert time[-1] == pytest.approx(6.0 - stack.period)
     assert value[-1] == pytest.approx(1.0, abs=0.05)
     assert later.loops["roll"][1].phase < found.loops["roll"][1].phase
+
+
+def test_the_stabilised_hand_takes_margin_from_the_axes_that_the_arm_pushes(vehicle):
+    """The arm of the S-500 moves in the plane of x and z: y and roll stay as they are."""
+    free, steered = (
+        analyse(stack_model(load_profile(*names), vehicle, arm=(0.6, -1.0)))
+        for names in (("s500",), ("s500", "hand"))
+    )
+    assert free.hand_delay is None and steered.hand_delay > 0.03
+    assert steered.stable
+    for loop, is_less in (("x", True), ("pitch", True), ("y", False), ("roll", False)):
+        before, after = free.loops[loop][1], steered.loops[loop][1]
+        assert (after.gain < before.gain - 0.2 or after.phase < before.phase - 3.0) == is_less, loop
+    assert steered.loops["x"][1].gain > 6.0  # [dB]
+    assert steered.setpoint_delay == pytest.approx(free.setpoint_delay, rel=0.02)
 
 
 def test_poses_may_be_older_for_a_slower_observer():
