@@ -20,7 +20,8 @@ from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X, Z
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler, rotate_back
 from uam_control.maths.vectors import cross, minus, plus, times, vector
-from uam_control.settings.parameter_set import ParameterError, number, switch
+from uam_control.settings import parameter_set
+from uam_control.settings.parameter_set import ANY_LENGTH, ParameterError, number, switch
 from uam_control.vehicle import GRAVITY
 
 FRICTION_SPEED = 0.05  # [rad/s] of the reference at which tanh(1) of the dry friction is added
@@ -34,23 +35,32 @@ class ArmLoadParameters(ChainParameters):
         False, "the known load of the arm is fed forward; false: as printed"
     )
     arm_gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+    joint_load_friction: tuple = parameter_set.vector(
+        (), "friction of each joint per torque; none: 0", "1", 0.0, 0.9, ANY_LENGTH, True
+    )
 
     def check_together(self) -> None:
         """See `ParameterSet.check_together`."""
         super().check_together()
         if self.arm_feedforward and not self.link_masses:
             raise ParameterError("arm_feedforward: needs link_masses, the mass of each link")
+        given, joints = len(self.joint_load_friction), len(self.link_masses)
+        if given not in (0, joints):
+            raise ParameterError(f"joint_load_friction: {given} numbers, {joints} expected")
 
     def load(self) -> ArmLoad:
         """Return what `arm_load` uses."""
         chain, torques = self.chain(), np.zeros(len(self.link_masses))
-        return ArmLoad(chain, float(self.arm_gravity), bool(self.arm_feedforward), torques)
+        share = np.array(self.joint_load_friction or torques, dtype=float)
+        return ArmLoad(chain, share, float(self.arm_gravity), bool(self.arm_feedforward), torques)
 
 
 class ArmLoad(NamedTuple):
-    """gravity [m/s^2]; on: whether the load is fed forward; torques (n,) [N m]: of the joints."""
+    """share (n,): friction per torque; gravity [m/s^2]; on: whether the load is fed forward;
+    torques (n,) [N m]: of the joints."""
 
     chain: Chain
+    share: np.ndarray
     gravity: float
     on: bool
     torques: np.ndarray
@@ -74,7 +84,8 @@ def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float
     push, moment = inverse_dynamics(chain, motion, force, rates, change, load.torques)
     for j in range(count):
         speed = reference[CHI_DOT, ALPHA + j]
-        friction = chain.friction[j] * math.tanh(speed / FRICTION_SPEED)
+        dry = chain.friction[j] + load.share[j] * abs(load.torques[j])
+        friction = dry * math.tanh(speed / FRICTION_SPEED)
         load.torques[j] += chain.damping[j] * speed + friction
     moment = plus(moment, cross(vector(chain.base_centre), times(chain.base_mass, force)))
     # nothing pushes aside what the arm's motion pushes: the whole vehicle gives way

@@ -19,10 +19,11 @@ from uam_control.control.output_limits import (
     lead_attitude,
     limit_torque,
     take_known_load,
+    turn_level,
 )
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA, CHI
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, YAW
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays
 from uam_control.maths.compiled import jit
@@ -47,11 +48,13 @@ class ControllerArrays(NamedTuple):
 
 class PositionArrays(NamedTuple):
     """Of the `PositionController`. carried [m/s^2]: bias (3,) of the law, integral (3,) of
-    integral_gain e; filter, lead, attitude: see `attitude_reference_step`."""
+    integral_gain e; turning: whether the bias turns with the heading; filter, lead, attitude: see
+    `attitude_reference_step`."""
 
     all: ControllerArrays
     completion: ForceCompletion
     carried: tuple[np.ndarray, np.ndarray]
+    turning: bool
     cutoff: float
     filter: np.ndarray
     lead: np.ndarray
@@ -143,7 +146,8 @@ def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
 def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     """Complete the law's force and limit it; then write the desired attitude.
 
-    See `complete_and_limit` and `attitude_reference_step`.
+    See `complete_and_limit` and `attitude_reference_step`. The bias of the next tick turns with the
+    reference's heading: about the vertical body rates and rates of the heading differ by the tilt.
     """
     m, tau = a.all.numbers[0], a.all.tau
     saturated, e, found = m.saturated != 0, a.all.own[E], a.all.law.tau
@@ -151,6 +155,8 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
         reference, e, a.completion, saturated, dt, a.carried, found, tau
     )
     attitude_reference_step(tau, reference, a.cutoff, dt, a.filter, a.lead, a.attitude)
+    if a.turning and m.frozen == 0:
+        turn_level(reference[CHI_DOT, YAW] * dt, a.carried[0])
 
 
 @jit

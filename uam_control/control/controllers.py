@@ -27,6 +27,7 @@ from uam_control.control.around_law import (
     predict_by,
 )
 from uam_control.control.output_limits import (
+    HEADING,
     ArmLimits,
     AttitudeLimits,
     ForceCompletion,
@@ -165,7 +166,7 @@ class PositionController(Controller):
         )
         filtered = float(cutoff), desired.filter, desired.lead, desired.value
         carried = self.law.bias, self._integral
-        arrays = PositionArrays(of_all, completion, carried, *filtered)
+        arrays = PositionArrays(of_all, completion, carried, p.bias_frame == HEADING, *filtered)
         rows = self._errors
         self._begin = bound(begin_law, of_all, rows, rows, desired.value, True)
         self._end = bound(end_position, arrays, rows, 0.0)

@@ -35,7 +35,7 @@ from uam_control.settings.parameter_set import ParameterSet, number
 
 FADE = 0.5  # [s] in which the correction comes and goes
 RETURN = 4.0  # [rad/s] bandwidth of the way back to the reference, without a bandwidth of its own
-INSIDE = 0.02  # [rad] of a joint's range
+INSIDE = 0.1  # [rad] of a joint's range, within which the supervisor holds up to 0.05 before its end
 WHOLE, REAL = "has_hand", "bandwidth damping rate_max error_max weight period"
 
 
@@ -102,7 +102,9 @@ def steer(
         target = m.weight * dot(vector(h.jacobian[:3, i]), goal)
         now, angle = h.correction[0, i], reference[CHI, ALPHA + i]
         rate = min(m.rate_max, max(-m.rate_max, bandwidth * (target - now)))
-        after = min(h.ranges[1, i] - angle, max(h.ranges[0, i] - angle, now + rate * dt))
+        # a reference that is near the end of its range stays there
+        low, high = min(0.0, h.ranges[0, i] - angle), max(0.0, h.ranges[1, i] - angle)
+        after = min(high, max(low, now + rate * dt))
         if saturated and wanted:
             after = now
         if not wanted and m.weight == 0.0 and abs(after) < 1e-6:

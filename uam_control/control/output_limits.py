@@ -28,6 +28,7 @@ RESERVE = 0.2  # of thrust_max, for the horizontal force if the vertical one tak
 
 
 LONGEST_PREDICTION = 0.1  # [s]
+WORLD, HEADING = "world", "heading"  # frames of the position's theta_hat
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,12 @@ class PositionLimits(ParameterSet):
     )
     integral_limit: float = number(
         3.0, "largest acceleration of the integral action, per axis", "m/s^2", 0.0, 20.0
+    )
+    bias_frame: str = choice(
+        WORLD,
+        "where theta_hat is constant: in the world, as wind, or turning with the heading, as the "
+        "force of a tilted rotor",
+        (WORLD, HEADING),
     )
     thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
     thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
@@ -220,6 +227,14 @@ def lead_attitude(
     for i in range(len(more)):
         errors[FEEDFORWARD, ROLL + i] += more[i]
     wash_out(errors[FEEDFORWARD, ROLL:ALPHA], corner, dt, slow)
+
+
+@jit
+def turn_level(angle: float, bias: np.ndarray) -> None:
+    """Turn bias (3,) by angle [rad] about the vertical, in place."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = bias[0], bias[1]
+    bias[0], bias[1] = cosine * x - sine * y, sine * x + cosine * y
 
 
 @jit

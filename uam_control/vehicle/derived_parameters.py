@@ -23,7 +23,7 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             f"{vehicle.file}: no gains of the autopilot: uam vehicle design {vehicle.source}"
         )
     arm = as_parameters(chain_of(vehicle))
-    load = arm | {"arm_gravity": vehicle.gravity}
+    load = arm | {"arm_gravity": vehicle.gravity} | _load_friction(vehicle)
     drag = [round(drag / vehicle.mass, 6) for drag in vehicle.numbers["air"]["drag"]]
     return {
         "state_estimator": {"gravity": vehicle.gravity},
@@ -55,6 +55,13 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             "rate_k": [vehicle.autopilot_gains.get(f"MC_{axis}RATE_K", 1.0) for axis in AXES],
         },
     }
+
+
+def _load_friction(vehicle: VehicleDescription) -> dict[str, list[float]]:
+    """Return the friction of the joints per torque, where their servos have one."""
+    servos = map(vehicle.servo_numbers, range(len(vehicle.joints)))
+    shares = [float(one.get("load_friction", 0.0)) for one in servos]
+    return {"joint_load_friction": shares} if any(shares) else {}
 
 
 def _integral_ratios(vehicle: VehicleDescription) -> list[float]:

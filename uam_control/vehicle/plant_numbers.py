@@ -10,7 +10,8 @@ from uam_control.settings.section import Section
 NOT_OF_THE_PLANT = (
     *("model", "profiles", "autopilot", "control_period", "mass", "gravity", "joints", "arm"),
     "end_effector",
-    *("rotors.layout", "rotors.radius", "rotors.moment_ratio", "servos.effort_limit"),
+    *("rotors.layout", "rotors.radius", "rotors.moment_ratio"),
+    *("servos.effort_limit", "servos.load_friction"),
 )
 
 LEAST_RATE, LARGEST_RATE = 30.0, 360.0  # [Hz] of poses with which the estimator is made to fly
@@ -45,6 +46,8 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
         sensor.whole("latency_ticks")
     for servo in servos:
         servo.whole("command_latency_ticks")
+        if servo.has("load_friction"):
+            servo.not_negative("load_friction")
         for name in filter(servo.has, ("torque_per_current", "current_unit")):
             servo.positive(name)
     variation = top.section("variation")

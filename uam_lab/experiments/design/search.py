@@ -37,6 +37,7 @@ from uam_sim_bridge.plant import Vehicle
 
 STEP, ROUNDS = 0.92, 40
 RATES = "rate loop"
+OBSERVED = 0.23  # periods of its bandwidth, by which the observer's velocity of a joint is late
 ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
 
 
@@ -132,7 +133,7 @@ class Search:
 
     def _arm(self) -> np.ndarray:
         c, facts, described = self._criteria, self.facts, self._described
-        age = facts.bus + 1.0 / EstimatorParameters().joint_velocity_weight
+        age = facts.bus + OBSERVED / EstimatorParameters().joint_observer_bandwidth
         late = c.joint / age
         torques = c.authority.servo * facts.servo
         strong = np.sqrt(torques / (c.feedback.stiffness * c.saturation.joint * facts.joints))
