@@ -56,6 +56,21 @@ def test_friction_acts_with_the_motion():
     np.testing.assert_allclose(with_friction - without, [0.0, -0.1], atol=1e-6)
 
 
+def test_a_gear_under_load_takes_a_share_of_it():
+    reference = np.zeros((3, 8))
+    reference[0, 6], reference[1, 6:] = math.pi / 2, (2.0, -2.0)  # still: 9.81 N/kg alone bends it
+    free, _ = load(reference)
+    weight, _ = load(np.where(reference == 2.0, 0.0, np.where(reference == -2.0, 0.0, reference)))
+    taken, _ = load(reference, joint_load_friction=[0.5, 0.25])
+    expected = [0.5 * abs(weight[0]), -0.25 * abs(weight[1])]
+    np.testing.assert_allclose(taken - free, expected, rtol=0.1)
+
+
+def test_shares_of_friction_are_one_for_each_joint():
+    with pytest.raises(ParameterError, match="joint_load_friction: 1 numbers, 2 expected"):
+        load(np.zeros((3, 8)), joint_load_friction=[0.1])
+
+
 def test_the_moment_is_that_of_the_forces_on_the_links():
     """One link of 1 kg at 1 m that begins to swing: r x m (a + g), in the tilted body."""
     reference = np.zeros((3, 7))

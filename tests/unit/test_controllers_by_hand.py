@@ -88,6 +88,22 @@ def test_the_attitude_error_of_xi_is_against_the_reference_of_the_last_tick():
         assert rho == pytest.approx(expected, abs=1e-8)  # rho = K1 ||xi||
 
 
+@pytest.mark.parametrize("frame, adapt", [("world", True), ("heading", True), ("heading", False)])
+def test_theta_hat_turns_with_the_heading_where_it_is_asked_for(frame, adapt):
+    law = dict.fromkeys(("lambda_1", "lambda_2", "lambda_table", "inertia", "bias_gain"), 1.0)
+    values = {name: [value] * 3 for name, value in law.items()}
+    values |= {"q_position": [1.0] * 3, "q_velocity": [1.0] * 3, "k_initial": [1.0] * 4}
+    values |= {"nu": [1.0] * 4, "bias_frame": frame, "adapt": adapt}
+    kind = controller_parameters(ModularParameters, PositionLimits)
+    controller, (state, reference, _) = PositionController(kind.from_mapping(values, 3)), vehicle()
+    controller.law.bias[:] = 2.0, 1.0, 3.0
+    reference[1, 0], reference[1, 5] = 1.0, 5.0 * math.pi  # handed back in flight; 0.1 s: 90 deg
+    state[1, 0] = 1.0  # without an error, so that theta_hat only turns
+    controller.update(state, reference, True, 0.1)
+    turns = frame == "heading" and adapt
+    np.testing.assert_allclose(controller.law.bias, [-1.0, 2.0, 3.0] if turns else [2.0, 1.0, 3.0])
+
+
 def test_on_the_ground_there_is_no_force_and_the_law_starts_afresh():
     controller, (state, reference, _) = position(thrust_max=5.0, gamma=1.0), vehicle()
     state[1, :3], state[0, 5] = 1.0, 0.7

@@ -35,7 +35,7 @@ from uam_control.settings.parameter_set import ParameterSet, number
 
 FADE = 0.5  # [s] in which the correction comes and goes
 RETURN = 4.0  # [rad/s] bandwidth of the way back to the reference, without a bandwidth of its own
-INSIDE = 0.1  # [rad] of a joint's range, within which the supervisor holds up to 0.05 before its end
+INSIDE = 0.1  # [rad] of the end of a joint's range; the supervisor holds up to 0.05 before it
 WHOLE, REAL = "has_hand", "bandwidth damping rate_max error_max weight period"
 
 
