@@ -1,10 +1,12 @@
 """The figures of one flight or of several flights overlaid: the paper's five and more.
 
-`draw(flights, directory)` writes them as PNG and SVG; each figure has its own function.
+`draw(flights, directory)` writes them as PNG, as SVG, and for plotly.js as JSON; each figure has
+its own function.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from matplotlib.ticker import NullFormatter
 from uam_control.laws import catalogue
 from uam_control.laws.law import GainGroup
 from uam_lab.records.results import metrics
+from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
@@ -24,6 +27,7 @@ from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.px4_figure import px4_log
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
+from uam_lab.report.figures.zoomable import zoomable
 
 DEGREES = 180.0 / np.pi
 ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
@@ -214,8 +218,8 @@ FIGURES: dict[str, tuple[Callable[[Sequence[DrawnFlight]], Figure | None], str]]
     "arm_errors": (arm_errors, "Joint error of the arm, truth minus reference."),
     "end_effector_path": (
         hand_path,
-        "The end effector from above and from the side, during the trajectory with its ramps if "
-        "there is one.",
+        "The end effector from above, from the side and in space, during the trajectory with its "
+        "ramps if there is one.",
     ),
     "end_effector_errors": (hand_errors, "Error of the end effector, truth minus reference."),
     "vehicle_inputs": (vehicle_inputs, "Force and torque commands of the two vehicle laws."),
@@ -264,5 +268,6 @@ def draw(
                 continue
             for suffix, metadata in ((".png", None), (".svg", {"Date": None})):
                 style.save(figure, directory / (name + suffix), metadata=metadata)
+            write_text(directory / f"{name}.json", json.dumps(zoomable(figure)))
             written.append(name)
     return written

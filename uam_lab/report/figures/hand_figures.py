@@ -13,9 +13,8 @@ from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight, Panel, corner_legend, flight_keys
 
-HEIGHT = 3.4  # [in]
-DASHES = (0, (3, 2))  # of the reference
-VIEWS = (("x", "y"), ("x", "z"))  # from above, from the side
+HEIGHT = 3.6  # [in]
+VIEWS = ("xy", "xz", "xyz")  # from above, from the side, in space
 MOST = 3000  # points of a path
 DEGREES = 180.0 / np.pi
 
@@ -33,24 +32,25 @@ def hand_errors(flights: Sequence[DrawnFlight]) -> Figure | None:
 
 
 def hand_path(flights: Sequence[DrawnFlight]) -> Figure | None:
-    """Draw the path of the end effector from above and from the side; None if a flight has none."""
+    """Draw the path of the end effector from two sides and in space; None if a flight has none."""
     if not _all_have(flights):
         return None
     figure = Figure(figsize=(style.WIDTH, HEIGHT))
-    axes = figure.subplots(1, len(VIEWS))
-    figure.subplots_adjust(left=0.08, right=0.985, top=0.84, bottom=0.14, wspace=0.24)
+    figure.subplots_adjust(left=0.08, right=0.97, top=0.86, bottom=0.14, wspace=0.3)
     style.title(figure, "Path of the end effector")
-    for axis, (across, up) in zip(axes, VIEWS, strict=True):
+    places = figure.add_gridspec(1, len(VIEWS), width_ratios=[max(1.0, len(v) / 2) for v in VIEWS])
+    for place, view in zip(places, VIEWS, strict=True):
+        axes = figure.add_subplot(place, projection="3d" if view[2:] else None)
         for number, flight in enumerate(flights):
             rows = _shown(flight.series)
             if number == 0:
-                wanted = (flight.series[f"{REFERENCE}.{one}"][rows] for one in (across, up))
-                axis.plot(*wanted, color=style.REFERENCE, linewidth=1.2, linestyle=DASHES, zorder=6)
-            true = (flight.series[f"{TRUTH}.{one}"][rows] for one in (across, up))
-            axis.plot(*true, color=style.flight_colour(number), linewidth=1.2, zorder=7)
-        axis.set(xlabel=f"{across} [m]", ylabel=f"{up} [m]")
-        axis.set_aspect("equal", adjustable="datalim")
-    reference = style.key("reference", style.REFERENCE, 1.1, DASHES)
+                wanted = (flight.series[f"{REFERENCE}.{one}"][rows] for one in view)
+                axes.plot(*wanted, color=style.REFERENCE, linewidth=1.2, linestyle="--", zorder=6)
+            true = (flight.series[f"{TRUTH}.{one}"][rows] for one in view)
+            axes.plot(*true, color=style.flight_colour(number), linewidth=1.2, zorder=7)
+        axes.set(**{f"{at}label": f"{one} [m]" for at, one in zip("xyz", view, strict=False)})
+        axes.set_aspect("equal", adjustable="datalim")
+    reference = style.key("reference", style.REFERENCE, 1.1, "--")
     corner_legend(figure, [reference, *flight_keys(flights)])
     return figure
 

@@ -24,6 +24,7 @@ SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
 BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
 LOWEST = 1e-6  # lower limit of the drawn tracking term, which may be zero
 MEAN_S = 0.2  # [s] averaging time of the forces, against the noise of the estimate
+BUCKETS = 400  # of a line
 COUPLING, ADAPTIVE, FEEDBACK, INTEGRAL = style.INK, *style.FLIGHTS[:3]
 ACTUATORS = "#9aa5af"
 TERMS = dict(
@@ -45,9 +46,8 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
         for values, colour in zip(_terms(subsystem), TERMS.values(), strict=True):
             if not values.any():
                 continue
-            axis.plot(
-                *panels.thin(found.time, np.maximum(values, LOWEST)), color=colour, linewidth=0.9
-            )
+            terms = panels.thin(found.time, np.maximum(values, LOWEST), BUCKETS)
+            axis.plot(*terms, color=colour, linewidth=0.9)
         _bounded(axis, found.time, subsystem.parts.total, subsystem.comparison)
         axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$", parse_math=True)
     handles = [
@@ -87,7 +87,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
             if colour == ACTUATORS and column >= ALPHA:
                 continue  # the servos' torque is not recorded
             mean = moving_mean(found.time, values[:, column])
-            axis.plot(*panels.thin(found.time, mean), color=colour, linewidth=width)
+            axis.plot(*panels.thin(found.time, mean, BUCKETS), color=colour, linewidth=width)
         axis.set_ylabel(label, parse_math=True)
         axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3))
         axis.margins(y=0.12)
@@ -128,9 +128,15 @@ def _terms(subsystem: Subsystem) -> tuple[np.ndarray, ...]:
 
 def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: ComparisonSystem) -> None:
     """Draw V, its ultimate bound and the solution of the differential inequality."""
-    axis.plot(*panels.thin(time, value), color=style.INK, linewidth=1.5, zorder=4)
+    axis.plot(*panels.thin(time, value, BUCKETS), color=style.INK, linewidth=1.5, zorder=4)
     envelope = comparison.envelope(value[0], time - time[0])
-    axis.plot(time, envelope, color=style.DROP, linewidth=1.0, linestyle=ENVELOPE, zorder=3.5)
+    axis.plot(
+        *panels.thin(time, envelope, BUCKETS),
+        color=style.DROP,
+        linewidth=1.0,
+        linestyle=ENVELOPE,
+        zorder=3.5,
+    )
     limit = max(value[0], comparison.bound)
     axis.axhline(limit, color=style.DROP, linewidth=1.0, linestyle=BOUND, zorder=3)
     axis.set_yscale("log")

@@ -14,6 +14,7 @@ from uam_lab.report.facts import change_rows, flight_summary, stability_rows
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import fault_marks
 from uam_lab.report.figures.figures import FIGURES
+from uam_lab.report.page.figure_entries import figure_entries
 from uam_lab.report.video.flight_video import Rendered, existing
 
 PAPER_SCENARIO = "pick_and_place"
@@ -38,7 +39,7 @@ FILES = (
     ("parameters.yaml", "the parameters of all nodes"),
     ("info.json", "conditions and command of the flight"),
     ("versions.json", "versions of the software"),
-    ("figures", "the figures as PNG and SVG, snapshots and video"),
+    ("figures", "the figures as PNG, SVG and for plotly.js, snapshots and video"),
     ("logs", "what each process printed"),
 )
 
@@ -81,7 +82,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         video=_embedded(rendered.video),
         poster=_embedded(_middle(rendered.snapshots)),
         problem=rendered.problem,
-        figures=_figures(directory / "figures"),
+        **figure_entries(directory / "figures", FIGURES),
         stability=_stability(directory / "stability.json"),
         comparison=comparison,
         no_parameters=no_parameters,
@@ -91,15 +92,6 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     )
     write_text(directory / "report.html", text)
     return directory / "report.html"
-
-
-def _figures(folder: Path) -> list[tuple[str, str, str]]:
-    """Return (name, caption, data URI) of the figures in `folder`."""
-    return [
-        (name, caption, _embedded(folder / f"{name}.png"))
-        for name, (_, caption) in FIGURES.items()
-        if (folder / f"{name}.png").exists()
-    ]
 
 
 def _middle(pictures: Sequence[Path]) -> Path | None:

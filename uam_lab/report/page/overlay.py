@@ -10,6 +10,7 @@ from uam_lab.records.results.atomic import write_text
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
+from uam_lab.report.page.figure_entries import figure_entries
 
 
 def build_overlay(
@@ -24,10 +25,7 @@ def build_overlay(
         "overlay.html.j2",
         labels=[flight.label for flight in flights],
         tables=[_table(flights, *table) for table in paper.tables(joints)],
-        figures=[
-            (name, figures.FIGURES[name][1], templates.embedded(out / "figures" / f"{name}.png"))
-            for name in drawn
-        ],
+        **figure_entries(out / "figures", drawn),
     )
     write_text(out / "report.html", text)
     return out / "report.html"
