@@ -43,7 +43,10 @@ KEYS = (
 )
 STAMPS = ((0, 0), (-1, 0), (-(2**31), 2**32 - 1), (4_102_444_800 - 2**32, 0), (2**31 - 1, 10**9))
 # a good goal would be followed: these get no message with a field that a flight may use
-PLANS = ("goal_pose", "base_trajectory", "arm_trajectory")
+PLANS = (
+    *("goal_pose", "base_trajectory", "arm_trajectory"),
+    *("end_effector/goal_pose", "end_effector/trajectory", "end_effector/twist"),
+)
 HEAD = b"\0\1\0\0"
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, Transform
+from geometry_msgs.msg import PoseStamped, Transform, TwistStamped
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -13,6 +13,7 @@ from trajectory_msgs.msg import (
 )
 from vehicle_rig import Vehicle, take_off
 
+from uam_lab.flights.operator import HAND_PLANNERS, PLANNERS
 from uam_msgs_py.messages import topics
 
 
@@ -20,10 +21,7 @@ from uam_msgs_py.messages import topics
 def vehicle(start, probe):
     start("uam_control.nodes.mission", "--ros-args", "-p", "scenario:=hover")
     made = Vehicle(probe)
-    made.planners = {
-        topic: probe.publisher(topic)
-        for topic in (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
-    }
+    made.planners = {topic: probe.publisher(topic) for topic in PLANNERS + HAND_PLANNERS}
     made.path = probe.collect(topics.PATH)
     publishers = made.planners.values()
     probe.until(lambda: all(p.get_subscription_count() for p in publishers), "subscriptions")
@@ -155,3 +153,60 @@ def test_a_stream_of_goals_arrives(vehicle):
     vehicle.until_state("holding")
     np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.5, 0, 1, 0], atol=1e-9)
     assert vehicle.stamp - begun < 6.0e9
+
+
+def twist(frame, x, turn=0.0):
+    message = TwistStamped()
+    message.header.frame_id = frame
+    message.twist.linear.x, message.twist.angular.y = x, turn
+    return message
+
+
+def test_the_hand_is_commanded_by_pose_trajectory_and_twist(vehicle):
+    """The S-500's hand is 0.14 m ahead of the base and 0.203 m below it while the arm is stowed."""
+    take_off(vehicle)
+    for topic, message, reason in (
+        (topics.END_EFFECTOR_GOAL, goal(9.0, 0.0, 1.0), "out of reach: the base would be at x"),
+        (topics.END_EFFECTOR_GOAL, goal(0.0, 0.0, -0.1), "out of reach: the hand's z is -0.10 m"),
+        (topics.END_EFFECTOR_GOAL, goal(0.0, 0.0, 1.0, 0.0, "map"), "frame_id 'map'"),
+        (topics.END_EFFECTOR_GOAL, goal(math.nan, 0.0, 1.0), "a coordinate of the goal is not"),
+        (topics.END_EFFECTOR_TWIST, twist("base_link", 0.1), "frame_id 'base_link'"),
+        (topics.END_EFFECTOR_TWIST, twist("", 0.0, 0.2), "out of reach: the arm cannot turn"),
+        (topics.END_EFFECTOR_TWIST, twist("", math.nan), "a velocity is not finite"),
+        (topics.END_EFFECTOR_TRAJECTORY, base_trajectory((0, 9.0, 0.0, 1.0)), "out of reach"),
+        (topics.END_EFFECTOR_TRAJECTORY, base_trajectory((1, 0, 0, 1.0), (1, 0, 0, 1.0)), "must"),
+    ):
+        text = answer(vehicle, topic, message)
+        assert text.startswith("refused: ") and reason in text, text
+
+    text = answer(vehicle, topics.END_EFFECTOR_GOAL, goal(0.4, 0.0, 0.7, 0.3))
+    assert text.startswith("accepted: at the end in "), text
+    vehicle.fly(2)
+    vehicle.until_state("holding")
+    found, (c, s) = vehicle.state[0], (math.cos(0.3), math.sin(0.3))
+    np.testing.assert_allclose(
+        found[[0, 1, 2, 5, 6, 7]],
+        [0.4 - 0.14 * c, -0.14 * s, 0.903, 0.3, 0.0, math.pi / 2],
+        atol=1e-9,
+    )
+
+    for _ in range(40):  # 20 Hz
+        assert answer(vehicle, topics.END_EFFECTOR_TWIST, twist("end_effector", 0.1)).startswith(
+            "acc"
+        )
+        vehicle.fly(12)
+    assert vehicle.state[1, :2] == pytest.approx([0.1 * c, 0.1 * s], abs=1e-4)
+    vehicle.fly(63)  # with the last 12 ticks 0.3 s
+    assert not vehicle.state[1].any()
+
+    x, y, z = vehicle.state[0, :3] + [0.14 * c, 0.14 * s, -0.203]
+    line = base_trajectory((0, x, y, z), (3, x + 0.3, y, z))
+    for point in line.points:
+        point.transforms[0].rotation.z, point.transforms[0].rotation.w = (
+            math.sin(0.15),
+            math.cos(0.15),
+        )
+    assert answer(vehicle, topics.END_EFFECTOR_TRAJECTORY, line).startswith("accepted")
+    vehicle.until_state("flying")
+    vehicle.until_state("holding")
+    np.testing.assert_allclose(vehicle.state[0, :2], [x + 0.3 - 0.14 * c, y - 0.14 * s], atol=1e-9)

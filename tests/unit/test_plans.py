@@ -6,24 +6,16 @@ import dataclasses
 
 import numpy as np
 import pytest
+from followed_reference import Flight, P, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.coordinates import ARM, CHI, YAW
-from uam_control.mission import Mission, MissionParameters, load_scenario
-from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check
-from uam_control.supervision import Event, OperatorCommand, Readings, State
-from uam_control.vehicle import derived_parameters, load_description
+from uam_control.mission.plan_limits import check
+from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points
+from uam_control.supervision import Event, OperatorCommand, State
 
-P = MissionParameters.from_mapping(derived_parameters(load_description())["mission"], 2)
 COORDINATE = st.floats(-1.0, 1.0)
-
-
-def reference(x=0.0, y=0.0, z=1.0, yaw=0.0, arm=(0.0, 0.5), speed=(0.0, 0.0, 0.0)):
-    made = np.zeros((3, 8))
-    made[CHI] = x, y, z, 0.0, 0.0, yaw, *arm
-    made[1, :3] = speed
-    return made
 
 
 def base(times, positions, yaw=0.0):
@@ -228,44 +220,6 @@ def test_a_plan_stops_on_its_curve(at):
     assert away.max() < 2e-3
     assert not found[-1, 1:].any()
     np.testing.assert_allclose(found[-1, CHI], plan.at(np.array([at + 0.75]))[CHI, 0], atol=1e-9)
-
-
-FRESH = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
-
-
-class Flight:
-    """A mission whose vehicle follows the reference exactly."""
-
-    def __init__(self, scenario="pick_and_place"):
-        self.mission = Mission(load_scenario(scenario), P)
-        self.state = reference(z=0.28, arm=(0.0, np.pi / 2))
-        self.stamp, self.armed, self.references = 100.0, None, []
-        self.step(1)
-        assert self.mission.start() == (True, "arming")
-
-    def step(self, ticks, dt=0.01):
-        for _ in range(ticks):
-            self.stamp += dt
-            output = self.mission.step(self.stamp, self.state, self.armed, FRESH)
-            self.armed = self.stamp if output.arm and self.armed is None else self.armed
-            if output.flying:
-                self.state = output.reference.copy()
-                self.references.append(self.state)
-        return self.mission.output
-
-    def until(self, condition):
-        for _ in range(20_000):
-            if condition(self.step(1)):
-                return
-        raise AssertionError(f"still {self.mission.output}")
-
-    def assert_smooth(self, dt=0.01):
-        """All but roll and pitch, whose rates may have steps where the jerk has."""
-        values = np.delete(np.array(self.references), [3, 4], axis=2)
-        rates = (values[2:, 0] - values[:-2, 0]) / (2 * dt)
-        np.testing.assert_allclose(rates, values[1:-1, 1], atol=4e-3)
-        slopes = (values[2:, 1] - values[:-2, 1]) / (2 * dt)
-        np.testing.assert_allclose(slopes, values[1:-1, 2], atol=0.12)
 
 
 @pytest.mark.parametrize("at", [9.0, 12.3, 15.0, 18.2])

@@ -1,8 +1,8 @@
 """The end effector in the world, of a base with any attitude: place, heading, elevation.
 
 Heading: of the horizontal across the tool's y axis; elevation: of its x axis above the horizontal,
-about its y axis (R = Rz(heading) Rx Ry(-elevation)). So both exist however an arm folds; they are
-lost only where the tool's y axis stands upright.
+about its y axis (R = Rz(heading) Rx(lean) Ry(-elevation)). So both exist however an arm folds; they
+are lost only where the tool's y axis stands upright.
 """
 
 from __future__ import annotations
@@ -30,8 +30,12 @@ from uam_control.maths.vectors import (
 )
 
 HAND = X, Y, Z, HEADING, ELEVATION = range(5)  # columns
+LEAN = 5  # a further one of TOOL: of the tool's y axis above the horizontal [rad]
+TOOL = (*HAND, LEAN)
 STEP = 1e-6  # [rad] of numerical derivatives
 NONE = 1e-9  # relative, of a singular value that counts as zero
+# relative to the slopes' squared size; absolute, for slopes of zero
+DAMPING, LEAST = 1e-9, 1e-30
 
 
 @jit
@@ -64,6 +68,12 @@ def elevation(turn: Rows) -> float:
 
 
 @jit
+def lean(turn: Rows) -> float:
+    """Return how far [rad] the y axis of a tool with this rotation to the world is raised."""
+    return math.asin(min(1.0, max(-1.0, turn[2][1])))
+
+
+@jit
 def _swung(chain: Chain, angles: np.ndarray, swing: float) -> Vector:
     """Return where down is in the base, for a hand whose hinge stands at `swing` [rad]."""
     turn = product(last_link(chain, angles)[1], about(vector(chain.swing_axis), swing))
@@ -72,8 +82,8 @@ def _swung(chain: Chain, angles: np.ndarray, swing: float) -> Vector:
 
 
 @jit
-def _write_hands(chain: Chain, chi: np.ndarray, swing: np.ndarray, found: np.ndarray) -> None:
-    """Write HAND (m, 5) of poses chi (m, 6 + n) with hinges at swing (m,) [rad]; NaN: they hang."""
+def _write_tools(chain: Chain, chi: np.ndarray, swing: np.ndarray, found: np.ndarray) -> None:
+    """Write TOOL (m, 6) of poses chi (m, 6 + n) with hinges at swing (m,) [rad]; NaN: they hang."""
     for i in range(len(chi)):
         rotation = rows(matrix_from_euler(chi[i, ATTITUDE]))
         down = times(-1.0, rotation[2])
@@ -83,17 +93,23 @@ def _write_hands(chain: Chain, chi: np.ndarray, swing: np.ndarray, found: np.nda
         for k in range(3):
             found[i, k] = place[k]
         found[i, HEADING], found[i, ELEVATION] = heading(turn), elevation(turn)
+        found[i, LEAN] = lean(turn)
 
 
 def hands(chain: Chain, chi: np.ndarray, swing: np.ndarray | None = None) -> np.ndarray:
-    """Return HAND (m, 5) [m, rad] of poses chi (m, 6 + n), see `coordinates`.
+    """Return HAND (m, 5) [m, rad] of poses chi (m, 6 + n); swing: see `tools`."""
+    return tools(chain, chi, swing)[:, : len(HAND)].copy()
+
+
+def tools(chain: Chain, chi: np.ndarray, swing: np.ndarray | None = None) -> np.ndarray:
+    """Return TOOL (m, 6) [m, rad] of poses chi (m, 6 + n), see `coordinates`.
 
     swing (m,) [rad]: angle of the hinge of a hand that hangs; NaN, or None: straight down.
     """
-    found = np.empty((len(chi), len(HAND)))
+    found = np.empty((len(chi), len(TOOL)))
     if swing is None or not np.any(chain.swing_axis):
         swing = np.full(len(chi), np.nan)
-    _write_hands(chain, np.ascontiguousarray(chi), np.ascontiguousarray(swing), found)
+    _write_tools(chain, np.ascontiguousarray(chi), np.ascontiguousarray(swing), found)
     return found
 
 
@@ -107,6 +123,14 @@ def jacobians(chain: Chain, chi: np.ndarray, columns: list[int]) -> np.ndarray:
         change[:, HEADING:] = np.angle(np.exp(1j * change[:, HEADING:]))
         found.append(change / STEP)
     return np.stack(found, axis=2)
+
+
+def least_change(slopes: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Return the least changes (m, k) that change values (m, r) by `off`; slopes (m, r, k)."""
+    square = slopes @ slopes.swapaxes(1, 2)
+    size = np.trace(square, axis1=1, axis2=2)[:, None, None] + LEAST
+    solved = np.linalg.solve(square + DAMPING * size * np.eye(square.shape[1]), off[:, :, None])
+    return (slopes.swapaxes(1, 2) @ solved)[:, :, 0]
 
 
 def stretch(chain: Chain, angles: np.ndarray) -> np.ndarray:

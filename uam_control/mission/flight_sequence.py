@@ -32,7 +32,8 @@ from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.nominal_tick import REAL, WHOLE
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.permission import ChecklistReport
-from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
+from uam_control.mission.plan_limits import check
+from uam_control.mission.plans import Goal, PlanRefused
 from uam_control.mission.pre_arm import PreArm
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
@@ -99,7 +100,7 @@ class FlightSequence:
         vars(self.output).update(vars(MissionOutput(reference)))
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters
-        self._requests: deque[tuple[OperatorCommand, GoalPose | Points | None]] = deque()
+        self._requests: deque[tuple[OperatorCommand, Goal | None]] = deque()
         self.plans_flown = 0  # in this flight
         self._guidance: Guidance | None = None
         self._watch: PayloadWatch | None = None
@@ -254,7 +255,8 @@ class FlightSequence:
                     guidance.follow(stamp, state)
                 event = changes[-1].event if len(changes) > before else None
                 if event is Event.GOAL or (moved and event is None):
-                    guidance.fly(stamp, goal.plan(stamp, guidance.motion, self._parameters))
+                    for part in goal.plan(stamp, guidance.motion, self._parameters).parts:
+                        guidance.fly(stamp, part)
                     self.plans_flown += 1
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
@@ -311,7 +313,7 @@ class FlightSequence:
             return ""
         return leaves_geofence(self._stamp, state, self._parameters, self._ground)
 
-    def plan(self, goal: GoalPose | Points) -> tuple[bool, str]:
+    def plan(self, goal: Goal) -> tuple[bool, str]:
         """Check a goal or trajectory; queue it for the next step if it can be flown.
 
         It replaces the path or the plan before it. At its end the mission holds until a command.
@@ -327,16 +329,18 @@ class FlightSequence:
         made = self._guidance.on_way_to(goal, self._stamp)
         if made is None:
             try:
+                goal = goal.solved(motion, parameters, self._ground)
                 goal.check(motion, parameters)
                 made = goal.plan(self._stamp, motion, parameters)
-                check(made, parameters, self._ground)
+                for part in made.parts:
+                    check(part, parameters, self._ground)
             except PlanRefused as error:
                 hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
                 return False, f"refused: {error}{hint}"
             self._ask_for(goal)
         return True, f"accepted: at the end in {max(0.0, made.end - self._stamp):.1f} s"
 
-    def _ask_for(self, goal: GoalPose | Points) -> None:
+    def _ask_for(self, goal: Goal) -> None:
         """Queue a goal for the next step, in place of one that waits for it."""
         columns = goal.columns
         waiting = (one for one in self._requests if one[1] is None or one[1].columns != columns)

@@ -35,7 +35,7 @@ from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.segments import Segment, WayBack
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion, write_motions
-from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, GoalPose, Plan, Points
+from uam_control.mission.plans import BASE, BOTH, HARDEST, PEAK, RAMP, Goal, Plan
 from uam_control.mission.scenarios.route import SINK
 
 COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
@@ -233,10 +233,12 @@ class Guidance:
         """Return whether a plan is flown, or held after its end, in place of the path."""
         return bool(self._plans) and self.course is not Course.END
 
-    def on_way_to(self, goal: GoalPose | Points, stamp: float) -> Plan | None:
+    def on_way_to(self, goal: Goal, stamp: float) -> Plan | None:
         """Return the plan that leads to an equal goal already, None without one."""
-        plan = self._plans.get(goal.columns is BASE)
-        return plan if self.planned and plan and plan.leads_to(goal, stamp) else None
+        parts = ((True, BASE), (False, ARM))
+        plans = [self._plans.get(base) for base, part in parts if goal.columns in (part, BOTH)]
+        leads = self.planned and all(plan and plan.leads_to(goal, stamp) for plan in plans)
+        return plans[0] if leads else None
 
     def arrived(self, stamp: float) -> bool:
         """Return whether every plan is at its end at `stamp` [s]; False without a plan."""

@@ -27,6 +27,7 @@ from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.quintics import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
+BOTH = slice(None)  # those of base and arm
 PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
 LONGER = 1.01  # precision of a blend's length
 TINY = 1e-9  # [m/s]
@@ -52,14 +53,15 @@ class Plan:
         times: np.ndarray,
         points: np.ndarray,
         blend: Blend,
-        goal: GoalPose | Points,
+        goal: Goal,
+        columns: slice | None = None,
     ) -> None:
         """stamp [s]: of the start. times (m,) [s] from there, increasing from 0, m at least 2.
 
         points (3, m, k): values, rates and accelerations; the last point is at rest. goal: that the
-        plan leads to, with the k columns of the reference that the plan writes.
+        plan leads to; columns: the k of the reference that the plan writes, None: the goal's.
         """
-        self.columns, self._goal = goal.columns, goal
+        self.columns, self._goal = columns or goal.columns, goal
         self._stamp, self._times, self._points = stamp, times, points
         lengths = np.diff(times)[:, None]
         self._powers = quintic(points[:, :-1], points[:, 1:], lengths)
@@ -70,6 +72,19 @@ class Plan:
         self._clock = PathClock(stamp)
 
     @property
+    def parts(self) -> tuple[Plan, ...]:
+        """The plans of base and arm, which begin and end together; itself, if it is one of them."""
+        if self.columns is not BOTH:
+            return (self,)
+        return tuple(
+            Plan(
+                *(self._stamp, self._times, self._points[:, :, part], self._blend.of_part(part)),
+                *(self._goal, part),
+            )
+            for part in (BASE, ARM)
+        )
+
+    @property
     def end(self) -> float:
         """The stamp [s] from which on the plan is at rest."""
         return self._clock.settled if self._stopped else self._stamp + self._length
@@ -78,7 +93,7 @@ class Plan:
     def _stopped(self) -> bool:
         return self._clock.goal == 0.0
 
-    def leads_to(self, goal: GoalPose | Points, stamp: float) -> bool:
+    def leads_to(self, goal: Goal, stamp: float) -> bool:
         """Return whether an equal goal at `stamp` [s] changes nothing."""
         if self._stopped or type(goal) is not type(self._goal) or not goal.equals(self._goal):
             return False
@@ -133,9 +148,13 @@ class Blend:
     @classmethod
     def of(cls, reference: np.ndarray, columns: slice, p: MissionParameters) -> Blend:
         """Blend from reference (3, 6 + n): long enough to stop with the allowed acceleration."""
-        speed = float(np.linalg.norm(reference[CHI_DOT, POSITION])) if columns is BASE else 0.0
+        speed = float(np.linalg.norm(reference[CHI_DOT, POSITION])) if columns != ARM else 0.0
         length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
         return cls(reference[: CHI_DDOT + 1, columns].copy(), length)
+
+    def of_part(self, columns: slice) -> Blend:
+        """Return that of some of the columns."""
+        return replace(self, start=self.start[:, columns])
 
     @property
     def stop(self) -> np.ndarray:
@@ -159,16 +178,50 @@ class Blend:
         return times[apart], points[:, apart]
 
 
+class Goal:
+    """What a plan leads to. columns: BASE, ARM or BOTH, of the reference.
+
+    closed: whether it ends where it begins, to be flown again.
+    """
+
+    columns: slice
+    closed = False
+
+    def solved(self, reference: np.ndarray, p: MissionParameters, ground: float) -> Goal:
+        """Return the goal in coordinates of base and arm, from reference (3, 6 + n) on.
+
+        ground [m]: height at take-off. Raises PlanRefused.
+        """
+        return self
+
+    def equals(self, other: Goal) -> bool:
+        """Return whether another goal of this type is the same."""
+        return False
+
+    def check(self, reference: np.ndarray, p: MissionParameters) -> None:
+        """Raise PlanRefused for what cannot be planned from reference (3, 6 + n)."""
+
+    def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
+        """Return the plan from reference (3, 6 + n) at `stamp` [s]."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class GoalPose:
-    """A pose to fly to: position (3,) [m, ENU] and yaw [rad].
+class GoalPose(Goal):
+    """A pose to fly to: position (3,) [m, ENU] and yaw [rad]; arm: angles (n,) [rad], if it moves.
 
     A height of NaN keeps the present height, a yaw of NaN the present heading.
     """
 
     position: np.ndarray
     yaw: float = math.nan
-    columns, closed = BASE, False  # closed: whether it ends where it begins, to be flown again
+    arm: np.ndarray | None = None
+    asked: Goal | None = None  # the goal that it solves
+
+    @property
+    def columns(self) -> slice:
+        """See `Goal`."""
+        return BASE if self.arm is None else BOTH
 
     def equals(self, other: GoalPose) -> bool:
         """Return whether both are the same place, with the same coordinates left open."""
@@ -185,7 +238,8 @@ class GoalPose:
 
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
         """Return the plan from reference (3, 6 + n) at `stamp` [s]."""
-        blend, needed = Blend(reference[: CHI_DDOT + 1, BASE].copy(), 0.0), p.stop_time
+        now = reference[: CHI_DDOT + 1, self.columns].copy()
+        blend, needed = Blend(now, 0.0), p.stop_time
         while needed > LONGER * blend.length:  # until the velocity changes gently enough
             blend = replace(blend, length=needed)
             start, goal = blend.stop, blend.stop.copy()
@@ -193,6 +247,8 @@ class GoalPose:
             goal[:3][given] = self.position[given]
             if not math.isnan(self.yaw):
                 goal[YAW] = start[YAW] + wrap_angle(self.yaw - start[YAW])
+            if self.arm is not None:
+                goal[ARM] = self.arm
             way, turn = float(np.linalg.norm(goal[:3] - start[:3])), abs(goal[YAW] - start[YAW])
             # without a cruise: mean * speed = way, for a brake of stop_time, and a longer one
             steep, begin = RAMP / p.stop_acceleration, blend.length
@@ -200,23 +256,25 @@ class GoalPose:
             longest = (math.sqrt(begin**2 + 8.0 * steep * way) - begin) / (2.0 * steep)
             speed = min(p.goal_speed, shortest, longest)
             brake = max(p.stop_time, steep * speed)
-            mean = max((begin + brake) / 2, way / max(speed, TINY), turn / p.goal_yaw_rate)
+            swing = float(np.abs(goal[ARM] - start[ARM]).max(initial=0.0)) / p.stow_rate
+            mean = max((begin + brake) / 2, way / max(speed, TINY), turn / p.goal_yaw_rate, swing)
             change = (goal[:3] - start[:3]) / mean - blend.start[CHI_DOT, :3]
             needed = max(p.stop_time, steep * float(np.linalg.norm(change)))
-        return Plan(stamp, *blend.way(goal, mean, brake), blend, self)
+        return Plan(stamp, *blend.way(goal, mean, brake), blend, self.asked or self)
 
 
 @dataclass(frozen=True)
-class Points:
-    """A trajectory of the base or of the arm: times (m,) [s] from the start, points (3, m, k).
+class Points(Goal):
+    """A trajectory of base or arm or both: times (m,) [s] from the start, points (3, m, k).
 
     Rates or accelerations of NaN are not given; differences of the rows above replace them.
-    columns: BASE or ARM of a reference.
+    columns: BASE, ARM or BOTH, of a reference.
     """
 
     times: np.ndarray
     points: np.ndarray
     columns: slice
+    asked: Goal | None = None  # the goal that it solves
 
     def equals(self, other: Points) -> bool:
         """Return whether both are the same trajectory."""
@@ -236,9 +294,9 @@ class Points:
 
         A first point after time 0 is reached from the reference within its time.
         """
-        blend = Blend.of(reference, self.columns, p)
+        blend, goal = Blend.of(reference, self.columns, p), self.asked or self
         times, points = self.times, self.points.copy()
-        if self.columns is BASE:
+        if self.columns != ARM:
             yaw = np.unwrap(points[CHI, :, YAW])
             present = blend.start[CHI, YAW]
             points[CHI, :, YAW] = yaw + wrap_angle(yaw[0] - present) - (yaw[0] - present)
@@ -246,7 +304,7 @@ class Points:
             length = max(times[0], 2.0 * MIN_STEP) if times[0] else 2.0 * blend.length
             blend = replace(blend, length=min(blend.length, length / 2))
             way = blend.way(points[CHI, 0], length - blend.length, blend.length)
-            return Plan(stamp, *way, blend, self)
+            return Plan(stamp, *way, blend, goal)
         if times[0] > 0.0:
             first = np.zeros((3, 1, points.shape[2]))
             if times[0] > blend.length:
@@ -254,14 +312,34 @@ class Points:
             else:
                 blend, first[:, 0] = replace(blend, length=times[0]), blend.start
             times, points = np.append(0.0, times), np.concatenate([first, points], axis=1)
-        _differences(times, points, blend.start)
-        return Plan(stamp, *_stopped(times, points, p), blend, self)
+        fill_differences(times, points, blend.start)
+        return Plan(stamp, *_stopped(times, points, p), blend, goal)
 
     def check(self, reference: np.ndarray, p: MissionParameters) -> None:
         """Raise PlanRefused for bad times and numbers, or a first point far from the reference.
 
         reference (3, 6 + n); only a first point at time 0 must be near it.
         """
+        self.check_numbers()
+        if self.times[0] > 0.0:
+            return
+        apart = np.abs(self.points[CHI, 0] - reference[CHI, self.columns])
+        if self.columns != ARM:
+            way = float(np.linalg.norm(apart[:3]))
+            if way > p.plan_start_distance:
+                raise PlanRefused(
+                    f"the first point is {way:.2f} m from the reference, "
+                    f"{p.plan_start_distance:g} m allowed"
+                )
+            apart = np.abs(wrap_angle(apart[3:]))
+        if apart.max() > p.plan_start_angle:
+            raise PlanRefused(
+                f"the first point is {apart.max():.2f} rad from the reference, "
+                f"{p.plan_start_angle:g} rad allowed"
+            )
+
+    def check_numbers(self) -> None:
+        """Raise PlanRefused for bad times and numbers."""
         times, points = self.times, self.points
         if len(times) == 0:
             raise PlanRefused("no points")
@@ -278,30 +356,13 @@ class Points:
             )
         if not np.isfinite(points[CHI]).all():
             raise PlanRefused("a position is not finite")
-        if times[0] > 0.0:
-            return
-        apart = np.abs(points[CHI, 0] - reference[CHI, self.columns])
-        if self.columns is BASE:
-            way = float(np.linalg.norm(apart[:3]))
-            if way > p.plan_start_distance:
-                raise PlanRefused(
-                    f"the first point is {way:.2f} m from the reference, "
-                    f"{p.plan_start_distance:g} m allowed"
-                )
-            apart = np.abs(wrap_angle(apart[3:]))
-        if apart.max() > p.plan_start_angle:
-            raise PlanRefused(
-                f"the first point is {apart.max():.2f} rad from the reference, "
-                f"{p.plan_start_angle:g} rad allowed"
-            )
 
 
-ROUNDING = 1e-9  # [m or rad]
 MIN_STEP = 0.004  # [s] shortest time between two points
 MOST_POINTS = 500  # of a trajectory; the check of more takes longer than a tick
 
 
-def _differences(times: np.ndarray, points: np.ndarray, start: np.ndarray) -> None:
+def fill_differences(times: np.ndarray, points: np.ndarray, start: np.ndarray) -> None:
     """Replace rows of points (3, m, k) that are NaN by central differences.
 
     Those of the first point by the present reference's, start (3, k); zero at the end.
@@ -328,59 +389,3 @@ def _stopped(
     last = np.zeros((3, 1, points.shape[2]))
     last[CHI, 0] = points[CHI, -1] + points[CHI_DOT, -1] * length / 2
     return np.append(times, times[-1] + length), np.concatenate([points, last], axis=1)
-
-
-def check(plan: Plan, p: MissionParameters, ground: float) -> None:
-    """Raise PlanRefused if the plan leaves a limit anywhere; ground [m]: height at take-off.
-
-    A plan that begins beyond a limit of position or angle may come back, but not go further.
-    """
-    times = plan.samples()
-    values = plan.at(times)
-    if plan.columns is BASE:
-        names, unit = ("x", "y", "z"), "m"
-        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
-        low[2] = max(low[2], ground + p.airborne_height)
-        high[2] = min(high[2], ground + p.altitude_hold)
-        within = values[CHI, :, POSITION]
-    else:
-        names, unit = [f"alpha_{i + 1}" for i in range(values.shape[2])], "rad"
-        (low, high), within = p.joint_ranges, values[CHI]
-    low_now, high_now = np.minimum(low, within[0]), np.maximum(high, within[0])
-    for i, name in enumerate(names):
-        beyond = np.maximum(low_now[i] - within[:, i], within[:, i] - high_now[i])
-        k, end = int(np.argmax(beyond)), within[-1, i]
-        if not low[i] - ROUNDING <= end <= high[i] + ROUNDING:
-            k = len(times) - 1
-        elif beyond[k] <= ROUNDING:
-            continue
-        raise PlanRefused(
-            f"{name} is {within[k, i]:.2f} {unit} after {times[k]:.1f} s, "
-            f"allowed {low[i]:g} to {high[i]:g} {unit}"
-        )
-    for what, found, limit, unit in _rates(plan, values, p):
-        k = int(np.argmax(found))
-        if found[k] > limit:
-            raise PlanRefused(
-                f"{what} is {found[k]:.2f} {unit} after {times[k]:.1f} s, allowed {limit:g} {unit}"
-            )
-
-
-def _rates(plan: Plan, values: np.ndarray, p: MissionParameters) -> list[tuple]:
-    """Return (quantity, values (q,), limit, unit) of the rates of a plan's samples (3, q, k)."""
-    if plan.columns is ARM:
-        rate, acceleration = (np.abs(values[row]).max(axis=1) for row in (CHI_DOT, CHI_DDOT))
-        return [
-            ("joint rate", rate, p.plan_joint_rate, "rad/s"),
-            ("joint acceleration", acceleration, p.plan_joint_acceleration, "rad/s^2"),
-        ]
-    speed, acceleration = (
-        np.linalg.norm(values[row, :, POSITION], axis=1) for row in (CHI_DOT, CHI_DDOT)
-    )
-    yaw_rate, yaw_acceleration = (np.abs(values[row, :, YAW]) for row in (CHI_DOT, CHI_DDOT))
-    return [
-        ("speed", speed, p.plan_speed, "m/s"),
-        ("acceleration", acceleration, p.plan_acceleration, "m/s^2"),
-        ("yaw rate", yaw_rate, p.plan_yaw_rate, "rad/s"),
-        ("yaw acceleration", yaw_acceleration, p.plan_yaw_acceleration, "rad/s^2"),
-    ]

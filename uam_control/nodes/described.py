@@ -3,7 +3,7 @@
 import numpy as np
 from rclpy.node import Node
 
-from uam_control.arm.chain import Chain
+from uam_control.arm.hand import hands
 from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_scenario
 from uam_control.mission.motion.flyer import Flyer
 from uam_control.settings.configuration import ConfigurationError
@@ -42,10 +42,11 @@ def described_scenario(node: Node, vehicle: VehicleDescription) -> Scenario:
         raise ParameterError(f"scenario: {error}") from None
 
 
-def described_hand(vehicle: VehicleDescription) -> Chain | None:
-    """Return the arm of a vehicle with an end effector, else None; compiles the hand's message."""
+def described_hand(vehicle: VehicleDescription) -> Flyer | None:
+    """Return what flies an end effector, None without one; compiles what a hand needs."""
     flyer = Flyer.with_hand(vehicle)
-    if flyer is None:
-        return None
-    hand_message(0, flyer.chain, np.zeros(len(vehicle.coordinates)))
-    return flyer.chain
+    if flyer is not None:
+        chi = np.zeros((1, len(vehicle.coordinates)))
+        hand_message(0, flyer.chain, chi[0])
+        hands(flyer.chain, chi)
+    return flyer

@@ -127,7 +127,7 @@ class MissionNode(UamNode):
         self._preflight = self.publisher(topics.PREFLIGHT)
         self._path = self.publisher(topics.PATH)
         self._hand = self.publisher(topics.END_EFFECTOR_REFERENCE)
-        self._chain, self._hand_due = described_hand(vehicle), 0  # [ns]
+        self._flyer, self._hand_due = described_hand(vehicle), 0  # [ns]
         self._path_of = ""  # the plan that was published, see _publish_path
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
@@ -140,7 +140,7 @@ class MissionNode(UamNode):
         self.triggers = (topics.STATE.name,)
         offer(self, self._mission)
         self._planners = PlannerInputs(
-            self, self._mission, vehicle.joint_names, self._publish_answer
+            self, self._mission, vehicle.joint_names, self._flyer, self._publish_answer
         )
 
     def _reference_limits(self, profile: Profile) -> dict[str, float]:
@@ -239,11 +239,11 @@ class MissionNode(UamNode):
         self._reference.publish(
             self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
         )
-        if stage.flying and self._chain and not 0 < self._hand_due - stage.ahead <= HAND_PERIOD:
+        if stage.flying and self._flyer and not 0 < self._hand_due - stage.ahead <= HAND_PERIOD:
             self._hand_due = stage.ahead + HAND_PERIOD
             if self._hand.get_subscription_count():
                 chi = output.reference[CHI]
-                self._hand.publish(hand_message(stage.ahead, self._chain, chi))
+                self._hand.publish(hand_message(stage.ahead, self._flyer.chain, chi))
 
     def _publish_status(self, stamp: int) -> None:
         """Publish arming when it changes, and the status when it changes and twice a second."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 
-from uam_control.coordinates import ALPHA, ARM, CHI, POSITION, YAW
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DOT, POSITION, YAW
 from uam_control.mission.plans import BASE, MOST_POINTS, GoalPose, Points
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages.layouts import BadMessage, Cursor, is_little_endian
@@ -30,7 +31,7 @@ def read_goal(data: bytes) -> GoalPose:
     NaN keeps the heading.
     """
     message = deserialized(data, PoseStamped)
-    _check_frame(message.header.frame_id)
+    check_frame(message.header.frame_id)
     p, q = message.pose.position, message.pose.orientation
     height = math.nan if p.z == 0.0 else p.z
     return GoalPose(np.array([p.x, p.y, height]), _yaw(q.x, q.y, q.z, q.w))
@@ -41,33 +42,56 @@ def read_base_trajectory(data: bytes) -> Points:
 
     Velocities and accelerations are optional, in the world frame; angular: only z, the yaw's.
     """
+    body = read_body(data, "the vehicle's base")
+    points = np.zeros((len(BODY_ROWS), len(body.times), ALPHA))
+    points[CHI, :, POSITION] = body.positions
+    for i, quaternion in enumerate(body.rotations):
+        points[CHI, i, YAW] = yaw = _yaw(*quaternion)
+        if math.isnan(yaw):
+            raise BadMessage(f"point {i}: the rotation is no quaternion")
+    points[CHI_DOT:, :, POSITION] = body.rates[..., :3]
+    points[CHI_DOT:, :, YAW] = body.rates[..., 3]
+    return Points(body.times, points, BASE)
+
+
+class Body(NamedTuple):
+    """The points of a body: times (m,) [s], positions (m, 3) [m], rotations (m, 4): x y z w; rates
+    (2, m, 4): velocities and accelerations of x y z yaw, rows of NaN where not given."""
+
+    times: np.ndarray
+    positions: np.ndarray
+    rotations: np.ndarray
+    rates: np.ndarray
+
+
+def read_body(data: bytes, name: str) -> Body:
+    """Return the points of a serialized MultiDOFJointTrajectory of one body; raises BadMessage.
+
+    name: of the body, for errors.
+    """
     trajectory = _Trajectory(data)
-    _check_frame(trajectory.layout.frame)
+    check_frame(trajectory.layout.frame)
     if len(trajectory.layout.names) > 1:
         count = len(trajectory.layout.names)
-        raise BadMessage(f"{count} joints, 1 expected: the vehicle's base")
-    times, points = trajectory.empty(ALPHA)
+        raise BadMessage(f"{count} joints, 1 expected: {name}")
+    times, places = trajectory.empty(7)
+    rates = trajectory.empty(4)[1][1:]
     for i in range(len(times)):
-        points[:, i, ALPHA - 3 :] = 0.0
         for row, (what, size) in enumerate(BODY_ROWS):
             count = trajectory.count()
             if count > 1 or (row == CHI and count == 0):
                 raise BadMessage(f"point {i}: {count} {what}, 1 expected")
             if count == 0:
-                points[row, i] = np.nan
                 continue
             values = trajectory.numbers(size)
-            points[row, i, POSITION] = values[:3]
             if row == CHI:
-                points[row, i, YAW] = yaw = _yaw(*values[3:])
-                if math.isnan(yaw):
-                    raise BadMessage(f"point {i}: the rotation is no quaternion")
+                places[CHI, i] = values
                 continue
-            points[row, i, YAW] = values[-1]
-            if not all_finite(points[row, i]):
+            rates[row - 1, i] = *values[:3], values[-1]
+            if not all_finite(rates[row - 1, i]):
                 raise BadMessage(f"point {i}: a velocity or acceleration is not finite")
         times[i] = trajectory.time(i)
-    return Points(times, points, BASE)
+    return Body(times, places[CHI, :, :3], places[CHI, :, 3:], rates)
 
 
 def read_arm_trajectory(data: bytes, joints: Sequence[str]) -> Points:
@@ -133,18 +157,27 @@ class _Trajectory(Cursor):
         return seconds + nanoseconds / SECOND
 
 
-def _check_frame(frame: str) -> None:
+def check_frame(frame: str) -> None:
+    """Raise BadMessage for another frame than the world's."""
     if frame not in ("", WORLD):
         raise BadMessage(f"frame_id '{frame}', '{WORLD}' expected")
 
 
-def _yaw(x: float, y: float, z: float, w: float) -> float:
-    """Return the yaw [rad], NaN for an orientation of zeros or NaN; raises BadMessage for tilt."""
+def is_given(x: float, y: float, z: float, w: float) -> bool:
+    """Return whether there is an orientation: no zeros, no NaN; raises BadMessage for its norm."""
     norm = math.hypot(x, y, z, w)
     if norm == 0.0 or any(map(math.isnan, (x, y, z, w))):
-        return math.nan
+        return False
     if not math.isfinite(norm) or abs(norm - 1.0) > 0.1:
         raise BadMessage(f"the orientation has the norm {norm:g}, 1 expected")
+    return True
+
+
+def _yaw(x: float, y: float, z: float, w: float) -> float:
+    """Return the yaw [rad], NaN for an orientation of zeros or NaN; raises BadMessage for tilt."""
+    if not is_given(x, y, z, w):
+        return math.nan
+    norm = math.hypot(x, y, z, w)
     x, y, z, w = x / norm, y / norm, z / norm, w / norm
     tilt = math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
     if tilt > LEVEL:

@@ -68,7 +68,7 @@ class StateEstimatorNode(UamNode):
         self._writer = TrajectoryWriter(vehicle.coordinates)
         self._odometry = self.publisher(topics.ODOMETRY)
         self._hand = self.publisher(topics.END_EFFECTOR)
-        self._chain = described_hand(vehicle)
+        self._flyer = described_hand(vehicle)
         self._bias = self.publisher(topics.IMU_BIAS)
         self._body = frame(self, topics.BODY)
         self._bias_writer = ImuWriter(self._body)
@@ -163,8 +163,8 @@ class StateEstimatorNode(UamNode):
         self._odometry_at = stamp - stamp % self._odometry_period
         if self._odometry.get_subscription_count():
             self._odometry.publish(odometry_message(stamp, state, self._body))
-        if self._chain is not None and self._hand.get_subscription_count():
-            self._hand.publish(hand_message(stamp, self._chain, state[CHI]))
+        if self._flyer is not None and self._hand.get_subscription_count():
+            self._hand.publish(hand_message(stamp, self._flyer.chain, state[CHI]))
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         refused = self.stage.estimator.refused_poses

@@ -56,15 +56,17 @@ def add(commands: Subcommands) -> None:
         "goto",
         _goto,
         "fly to a position",
-        "Fly to a position [m, ENU] and hold it there.",
+        "Fly to a position [m, ENU] and hold it there: the base, or the hand (end effector).",
         "  uam goto 0.5 0 1.2 --yaw 90         turn north; without --yaw the heading stays\n"
-        "  uam goto 0.5 0 0                    keep the height\n",
+        "  uam goto 0.5 0 0                    keep the height\n"
+        "  uam goto --hand 0.5 0 0.8           bring the hand there, base and arm together\n",
         " 0.5 0 1.2",
     )
-    for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is")):
+    for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is, of the base")):
         goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
     text = "heading (default: as it is)"
     goto.option("--yaw", "DEGREES", text, type=number("heading", "degrees"))
+    goto.switch("--hand", "position and heading of the end effector")
     _command(commands, "status", _status, "phase, errors, who has control", "Show the flight.")
     _command(
         commands,
@@ -128,7 +130,8 @@ def _kill(operator: Operator, options: argparse.Namespace) -> int:
 
 def _goto(operator: Operator, options: argparse.Namespace) -> int:
     yaw = math.nan if options.yaw is None else math.radians(options.yaw)
-    return _said("goto", *operator.goto(options.x, options.y, options.z, yaw))
+    place = options.x, options.y, options.z
+    return _said("goto", *operator.goto(*place, yaw, options.hand))
 
 
 def _status(operator: Operator, _: argparse.Namespace) -> int:

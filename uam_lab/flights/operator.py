@@ -29,9 +29,18 @@ DECODE: dict[topics.Topic, Callable[[DiagnosticArray], Any]] = {
     topics.CHECKLIST: lambda m: (ChecklistState.from_message(m), read_items(m)),
 }
 PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
+HAND_PLANNERS = (
+    topics.END_EFFECTOR_GOAL,
+    topics.END_EFFECTOR_TRAJECTORY,
+    topics.END_EFFECTOR_TWIST,
+)
 LOOK = 0.05  # [s] between two looks for messages
 AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
 PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as long for its answer
+
+
+def _itself(message: Any) -> Any:
+    return message
 
 
 class NoFlight(RuntimeError):
@@ -82,10 +91,13 @@ class Operator:
         self._call("mission/kill")
         return self._call("mission/kill")
 
-    def goto(self, x: float, y: float, z: float, yaw: float = math.nan) -> tuple[bool, str]:
+    def goto(
+        self, x: float, y: float, z: float, yaw: float = math.nan, hand: bool = False
+    ) -> tuple[bool, str]:
         """Send a goal pose: position [m, ENU], yaw [rad]; z = 0 and a yaw of NaN keep the present.
 
-        Returns whether it was accepted, and the mission's answer. Raises NoFlight.
+        hand: of the end effector; its z = 0 is a height. Returns whether it was accepted, and the
+        mission's answer. Raises NoFlight.
         """
         goal = PoseStamped()
         goal.header.frame_id = topics.WORLD
@@ -93,13 +105,14 @@ class Operator:
         position.x, position.y, position.z = float(x), float(y), float(z)
         known = not math.isnan(yaw)  # zeros: no orientation
         turn.w, turn.z = (math.cos(yaw / 2.0), math.sin(yaw / 2.0)) if known else (0.0, 0.0)
-        return self.plan(goal)
+        return self.plan(goal, hand)
 
-    def plan(self, message: Any) -> tuple[bool, str]:
+    def plan(self, message: Any, hand: bool = False) -> tuple[bool, str]:
         """Send a goal or trajectory on the mission's topic of its type; see `goto`."""
-        topic = next((one for one in PLANNERS if isinstance(message, one.type)), None)
+        planners = HAND_PLANNERS if hand else PLANNERS
+        topic = next((one for one in planners if isinstance(message, one.type)), None)
         if topic is None:
-            kinds = ", ".join(one.type.__name__ for one in PLANNERS)
+            kinds = ", ".join(one.type.__name__ for one in planners)
             raise TypeError(f"{type(message).__name__} is no plan: {kinds} expected")
         before, sent = self.mission().answers, -math.inf
         publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
@@ -118,6 +131,14 @@ class Operator:
             self._node.destroy_publisher(publisher)
         _, _, answer = self.mission().answer.partition(": ")
         return not answer.startswith("refused"), answer
+
+    def hand_pose(self) -> PoseStamped:
+        """Return the estimate of the end effector from now on. Raises NoFlight."""
+        topic = topics.END_EFFECTOR
+        if topic not in self._readers.values():
+            self._readers[listen(self._node, topic)] = topic
+        self._newest.pop(topic, None)
+        return self._latest(topic)
 
     def mission(self) -> MissionStatus:
         """Return the mission's newest status. Raises NoFlight."""
@@ -150,7 +171,7 @@ class Operator:
         """Serve clients for at most `seconds`, then take the received messages."""
         self._executor.spin_once(timeout_sec=seconds)
         for inlet, topic in self._readers.items():
-            for found in self._door.decoded(inlet, DECODE[topic]):
+            for found in self._door.decoded(inlet, DECODE.get(topic, _itself)):
                 self._newest[topic] = found
 
     def _latest(self, topic: topics.Topic) -> Any:

@@ -42,6 +42,7 @@ except ImportError:  # not among the wheels of PyPI
 
 WORLD = "world"  # frame of poses and states, ENU; the vehicles of a domain share it
 BODY = "base_link"  # frame of rates, forces and torques, FLU; with the prefix of the namespace
+TOOL = "end_effector"  # frame of the end effector; likewise
 JOINT_SPACE = "joints"  # angles and torques about the joints' axes
 CHI_UNITS, POSE, TEXT, EACH_GAIN = "m, rad; /s; /s²", "m, quaternion", "text", "of each gain"
 TICK, CAMERAS, FRAMES, GAINS, SLOW = "250 Hz", "120 Hz", "25 Hz", "50 Hz", "1 Hz"
@@ -215,6 +216,15 @@ END_EFFECTOR = Topic("end_effector/pose", PoseStamped, RELIABLE, WORLD, POSE, AS
 END_EFFECTOR_REFERENCE = Topic("end_effector/reference", PoseStamped, RELIABLE, WORLD, POSE,
     ASKED_FOR, MISSION, readers="planners, viewers", recorded=False,
     about="the end effector of the reference, in flight")
+END_EFFECTOR_GOAL = Topic("end_effector/goal_pose", PoseStamped, PLANS, WORLD, POSE, ON_CHANGE,
+    f"{PLANNERS}, cockpit, uam goto --hand", readers=MISSION, one_publisher=False,
+    about="pose of the end effector to fly to, world; a turn about the vertical is a heading alone")
+END_EFFECTOR_TRAJECTORY = Topic("end_effector/trajectory", MultiDOFJointTrajectory, PLANS, WORLD,
+    "m, quaternion; /s; /s²", ON_CHANGE, PLANNERS, readers=MISSION, one_publisher=False,
+    about="trajectory of the end effector, world; velocities and accelerations optional")
+END_EFFECTOR_TWIST = Topic("end_effector/twist", TwistStamped, PLANS, "world or end_effector",
+    "m/s, rad/s", "10 Hz or more", "teleop, planners", readers=MISSION, one_publisher=False,
+    about="jog of the end effector; it stops when silent")
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic("uam/parameter_changes", DiagnosticArray, _qos(1000, latched=True), "", TEXT,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.arm.hand import ELEVATION, HEADING, hands, jacobians
+from uam_control.arm.hand import ELEVATION, HEADING, hands, jacobians, least_change
 from uam_control.coordinates import (
     ALPHA,
     ARM,
@@ -38,7 +38,6 @@ MEETS, MEETS_ANGLE = 1e-4, 1e-3  # [m], [rad] of the hand, from its task
 CLOSE = 2e-5  # [m, rad] at which the iteration ends
 # of the iteration; after the first ones it goes on while each is better by this factor
 ROUNDS, FIRST, BETTER = 40, 4, 0.9
-DAMPING = 1e-9  # of the joints' correction, relative to the largest singular value
 
 
 class Unreachable(ValueError):
@@ -96,7 +95,7 @@ def holding(task: Task, base: Polynomials, flyer: Flyer) -> Polynomials:
         slopes = jacobians(flyer.chain, flown.chi, columns)[:, kept]
         posture = _wanted(task, flown.times)[:, columns]
         left = np.einsum("ijk,ik->ij", slopes, chi[:, columns] - posture)
-        chi[:, columns] = posture + _least(slopes, off[:, kept] + left)
+        chi[:, columns] = posture + least_change(slopes, off[:, kept] + left)
 
     return _solved(task, flyer, base, corrected)
 
@@ -199,16 +198,8 @@ def _raised(chi: np.ndarray, off: np.ndarray, task: Task, flyer: Flyer) -> np.nd
     columns = [ALPHA + joint for joint in task.moves]
     slopes = jacobians(flyer.chain, chi, columns)[:, [ELEVATION]]
     found = np.zeros_like(chi[:, ARM])
-    found[:, list(task.moves)] = _least(slopes, off[:, None])
+    found[:, list(task.moves)] = least_change(slopes, off[:, None])
     return found
-
-
-def _least(slopes: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """Return the least corrections (m, k) that change values (m, r) by `off`; slopes (m, r, k)."""
-    square = slopes @ slopes.swapaxes(1, 2)
-    size = np.trace(square, axis1=1, axis2=2)[:, None, None]
-    solved = np.linalg.solve(square + DAMPING * size * np.eye(square.shape[1]), off[:, :, None])
-    return (slopes.swapaxes(1, 2) @ solved)[:, :, 0]
 
 
 def _missed(motion: Polynomials, task: Task, flyer: Flyer) -> str:

@@ -54,14 +54,14 @@ class Commands:
         """Stop the motors at once; return the answer."""
         return _accepted(self.call(Operator.kill))
 
-    def goto(self, x: float, y: float, z: float, yaw: float | None) -> str:
+    def goto(self, x: float, y: float, z: float, yaw: float | None, hand: bool = False) -> str:
         """Send a goal pose; return the answer."""
         heading = math.nan if yaw is None else yaw
-        return _accepted(self.call(lambda operator: operator.goto(x, y, z, heading)))
+        return _accepted(self.call(lambda operator: operator.goto(x, y, z, heading, hand)))
 
-    def plan(self, message: Any) -> str:
+    def plan(self, message: Any, hand: bool = False) -> str:
         """Send a goal or a trajectory; return the answer."""
-        return _accepted(self.call(lambda operator: operator.plan(message)))
+        return _accepted(self.call(lambda operator: operator.plan(message, hand)))
 
     def change(self, desired: Mapping[str, Mapping[str, Any]]) -> Changes:
         """Set parameters, all or none."""

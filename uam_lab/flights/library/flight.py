@@ -33,6 +33,7 @@ from uam_sim_bridge.faults.schedule import timed
 
 if TYPE_CHECKING:
     from uam_lab.flights.library.commands import Changes, Commands
+    from uam_lab.flights.library.hand import Hand
     from uam_lab.flights.processes.guest import Guest
 
 CONNECTED = 60.0  # [s] of wall time for the nodes to find each other before a command
@@ -298,6 +299,13 @@ class Flight:
     def goto(self, x: float, y: float, z: float, yaw: float | None = None) -> str:
         """Fly to a position [m, ENU] and hold it; yaw [rad], None: keep the heading."""
         return self._commands().goto(x, y, z, yaw)
+
+    @property
+    def hand(self) -> Hand:
+        """The end effector: `flight.hand.goto(...)`, `.plan(...)`, `.pose`."""
+        from uam_lab.flights.library.hand import Hand
+
+        return Hand(self._commands)
 
     def plan(self, message: Any) -> str:
         """Fly a PoseStamped, or a MultiDOFJointTrajectory of the base, or a JointTrajectory.

@@ -1,0 +1,266 @@
+"""Goals of the end effector: solved for base and arm, flown together, refused with the reason.
+
+The vehicle follows its reference exactly; the forward kinematics judge where the hand comes to.
+"""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from followed_reference import Flight
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_control.arm.hand import tools
+from uam_control.arm.placing import placed, turning
+from uam_control.coordinates import ARM, CHI, CHI_DOT, YAW
+from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist
+from uam_control.mission.motion.flyer import Flyer, flattened
+from uam_control.mission.plans import GoalPose
+from uam_control.supervision import Event, OperatorCommand, State
+from uam_control.vehicle import load_description
+
+VEHICLES = {name: load_description(name) for name in ("s500_arm", "s500_arm3", "t650")}
+FLYERS = {name: Flyer.of(vehicle) for name, vehicle in VEHICLES.items()}
+FREE = math.nan
+ROOM = np.array([[-5.0, -5.0, 0.6], [5.0, 5.0, 5.0]])
+
+
+def ranges(name):
+    return np.array([(one.low, one.high) for one in VEHICLES[name].joints]).T
+
+
+def hovering(name="s500_arm", **parameters):
+    flight = Flight("hover", VEHICLES[name], **parameters)
+    flight.until(lambda output: output.state is State.FLYING and output.time > 4.0)
+    return flight
+
+
+def hand(name, chi):
+    return tools(FLYERS[name].chain, np.atleast_2d(chi))[-1]
+
+
+def pose(name, *wanted):
+    return HandPose(FLYERS[name], np.array([*wanted, *[FREE] * (6 - len(wanted))]))
+
+
+def twist(name, linear, angular=(0.0, 0.0, 0.0), of_tool=False):
+    return HandTwist(FLYERS[name], np.array(linear), np.array(angular), of_tool)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.sampled_from(sorted(VEHICLES)),
+    st.lists(st.floats(0.02, 0.98), min_size=8, max_size=8),
+)
+def test_every_pose_that_a_vehicle_can_have_is_found(name, shares):
+    low, high = ranges(name)
+    chi = np.zeros(6 + len(low))
+    chi[:3] = ROOM[0] + np.array(shares[:3]) * (ROOM[1] - ROOM[0])
+    chi[YAW] = 6.28 * shares[3] - 3.14
+    chi[ARM] = low + np.array(shares[4 : 4 + len(low)]) * (high - low)
+    wanted = tools(FLYERS[name].chain, chi[None])
+    stowed = np.array(VEHICLES[name].stowed)
+    found = placed(FLYERS[name].chain, wanted, stowed, ranges(name), ROOM)
+    apart = tools(FLYERS[name].chain, found.chi) - wanted
+    np.testing.assert_allclose(apart[0, :3], 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.cos(apart[0, 3:]), 1.0, atol=1e-9)
+    assert not np.abs(found.off).max() > 1e-6
+    assert (found.chi[0, :3] >= ROOM[0] - 1e-6).all() and (found.chi[0, :3] <= ROOM[1] + 1e-6).all()
+    assert (found.chi[0, ARM] >= low).all() and (found.chi[0, ARM] <= high).all()
+
+
+def test_the_base_does_what_it_can_alone_by_hand():
+    """The S-500's magnet hangs 0.14 m ahead and 0.203 m below when it is stowed."""
+    wanted = np.array([[1.0, 2.0, 0.9, math.pi / 2, FREE, FREE]])
+    stowed = np.array([0.0, math.pi / 2])
+    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, ranges("s500_arm"), ROOM)
+    expected = [1.0, 2.0 - 0.14, 0.9 + 0.203, 0.0, 0.0, math.pi / 2, 0.0, math.pi / 2]
+    np.testing.assert_allclose(found.chi[0], expected, atol=1e-9)
+
+
+def test_the_arm_reaches_down_where_the_base_may_not():
+    wanted = np.array([[0.0, 0.0, 0.35, 0.0, FREE, FREE]])
+    stowed = np.array([0.0, math.pi / 2])
+    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, ranges("s500_arm"), ROOM)
+    assert found.chi[0, 2] == pytest.approx(0.6) and not np.abs(found.off).max() > 1e-6
+    assert abs(found.chi[0, 7]) < 1.4
+
+
+@pytest.mark.parametrize("name", sorted(VEHICLES))
+def test_rates_of_base_and_arm_move_the_tool_so(name):
+    chi = np.array([1.0, 2.0, 1.5, 0.0, 0.0, 0.7, *[0.3] * len(VEHICLES[name].joints)])
+    rates = np.array([0.1, -0.2, 0.05, 0.3, 0.2 * (name == "t650"), 0.0])
+    found, missed = turning(FLYERS[name].chain, chi, rates)
+    moved = hand(name, chi + 1e-6 * found) - hand(name, chi)
+    np.testing.assert_allclose(moved / 1e-6, rates, atol=1e-4)
+    np.testing.assert_allclose(missed, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("s500_arm", (0.5, 0.2, 0.6, 0.5)),
+        ("s500_arm", (0.5, 0.2, 0.3)),
+        ("s500_arm3", (-0.3, 0.2, 0.26, 2.0)),
+        ("t650", (0.5, 0.2, 0.8, -3.0, 0.3, 0.0)),
+        ("t650", (0.1, -0.4, 0.9, 1.0, 1.0, 0.1)),
+    ],
+)
+def test_a_pose_is_reached_by_base_and_arm_together(name, wanted):
+    flight, goal = hovering(name), pose(name, *wanted)
+    before = hand(name, flight.state[CHI])
+    accepted, text = flight.mission.plan(goal)
+    assert accepted, text
+    arrived = flight.stamp + float(text.split()[-2])
+    flight.until(lambda output: output.state is State.FLYING and output.phase == "goal")
+    flight.until(lambda output: output.state is State.HOLDING)
+    assert flight.stamp == pytest.approx(arrived, abs=0.07)  # 0.1 s in the text
+    found, expected = hand(name, flight.state[CHI]), np.array([*wanted, *[FREE] * 6])[:6]
+    expected = np.where(np.isnan(expected), found, expected)
+    expected[3] = before[3] if len(wanted) < 4 else wanted[3]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert flight.mission.plan(pose(name, *wanted)) == (True, "accepted: at the end in 0.0 s")
+    flight.assert_smooth()
+
+
+def test_another_goal_of_the_base_replaces_the_hand_and_keeps_the_arm():
+    flight = hovering()
+    assert flight.mission.plan(pose("s500_arm", 0.5, 0.2, 0.3))[0]
+    flight.step(40)
+    assert flight.mission.plan(GoalPose(np.array([0.0, 0.0, 1.0])))[0]
+    flight.until(lambda output: output.state is State.HOLDING)
+    np.testing.assert_allclose(flight.state[CHI, :3], [0.0, 0.0, 1.0], atol=1e-9)
+    flight.assert_smooth()
+
+
+@pytest.mark.parametrize(
+    ("goal", "text"),
+    [
+        (pose("s500_arm", 9.0, 0.0, 1.0), "out of reach: the base would be at x = 8.7"),
+        (pose("s500_arm", 0.0, 0.0, 0.1), "out of reach: the base would be at z = 0.44 m"),
+        (pose("s500_arm", 0.0, 0.0, -0.1), "out of reach: the hand's z is -0.10 m, the floor is"),
+        (pose("s500_arm", FREE, 0.0, 1.0), "a coordinate of the goal is not finite"),
+        (pose("s500_arm", 0.0, 0.0, 1.0, math.inf), "a coordinate of the goal is not finite"),
+        (pose("s500_arm", 0.0, 0.0, 1.0, 0.0, 0.4, 0.0), "the arm leaves the tool 23 deg from its"),
+        (pose("s500_arm", 0.0, 0.0, 1.0, 0.0, 0.0, 1.5), "singular: the tool's y axis leans by 86"),
+        (twist("s500_arm", (0.1, FREE, 0.0)), "a velocity is not finite"),
+        (twist("s500_arm", (0.0, 0.0, 0.0), (0.0, 0.2, 0.0)), "the arm cannot turn the tool so"),
+    ],
+)  # fmt: skip
+def test_a_refusal_says_why(goal, text):
+    flight = hovering()
+    before = len(flight.mission.changes)
+    accepted, answer = flight.mission.plan(goal)
+    assert not accepted and text in answer and "\n" not in answer
+    flight.step(2)
+    assert len(flight.mission.changes) == before
+
+
+def points(name, times, rows, rates=None):
+    wanted = np.array([[*row, FREE, FREE] for row in rows])
+    given = np.full((2, len(times), 4), np.nan) if rates is None else rates
+    return HandPoints(FLYERS[name], np.array(times, dtype=float), wanted, given)
+
+
+def test_a_trajectory_of_the_hand_counts_the_tilt_of_the_base():
+    """On a curve with velocities the hand of the flown reference passes within 1 mm."""
+    flight = hovering()
+    x, y, z = hand("s500_arm", flight.state[CHI])[:3]
+    times = np.arange(0.0, 12.01, 0.25)
+    u = times / 12.0
+    turn = 2.0 * np.pi * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    rows = np.column_stack([x + 0.3 * np.sin(turn), y + 0.3 - 0.3 * np.cos(turn),
+                            np.full_like(u, z), np.zeros_like(u)])  # fmt: skip
+    flight.references.clear()
+    accepted, text = flight.mission.plan(points("s500_arm", times, rows))
+    assert accepted, text
+    flight.until(lambda output: output.state is State.HOLDING)
+    flown = np.array(flight.references)[50:1200]  # after the blend
+    flattened(flown := flown.swapaxes(0, 1).copy(), FLYERS["s500_arm"])
+    found = tools(FLYERS["s500_arm"].chain, flown[CHI])[:, :2]
+    away = np.hypot(found[:, 0] - x, found[:, 1] - y - 0.3)
+    np.testing.assert_allclose(away, 0.3, atol=1e-3)
+    flight.assert_smooth()
+
+
+@pytest.mark.parametrize(
+    ("times", "rows", "text"),
+    [
+        ([0.0, 0.3], [(0, 0, 0), (0.5, 0, 0)], r"speed is .* allowed 1 m/s"),
+        ([0.0, 9.0], [(0, 0, 0), (9.0, 0, 0)], "out of reach: point 1: the base would be at x"),
+        ([0.0, 9.0], [(0.5, 0, 0), (0, 0, 0)], "the first point is 0.50 m from the reference"),
+        ([2.0, 1.0], [(0, 0, 0), (0, 0, 0)], "time_from_start of point 1"),
+        ([0.0, 9.0], [(0, 0, 0), (0, FREE, 0)], "a position is not finite"),
+    ],
+)  # fmt: skip
+def test_a_trajectory_is_checked_as_the_bases(times, rows, text):
+    flight = hovering()
+    here = hand("s500_arm", flight.state[CHI])
+    made = points("s500_arm", times, [(*(here[:3] + row), 0.0) for row in rows])
+    accepted, answer = flight.mission.plan(made)
+    assert not accepted and re.search(text, answer), answer
+
+
+def jogged(flight, goal, seconds, every=5):
+    """Send a jog `every` ticks of 10 ms."""
+    for _ in range(round(100 * seconds / every)):
+        accepted, text = flight.mission.plan(goal)
+        assert accepted, text
+        flight.step(every)
+
+
+@pytest.mark.parametrize("name", sorted(VEHICLES))
+def test_a_jog_moves_the_hand_and_ends_when_the_messages_do(name):
+    flight = hovering(name)
+    begin, flight.references[:] = hand(name, flight.state[CHI]), []
+    jogged(flight, twist(name, (0.0, 0.1, 0.05), (0.0, 0.0, 0.2)), 2.0)
+    moving = hand(name, flight.state[CHI] + 0.01 * flight.state[CHI_DOT])
+    np.testing.assert_allclose(
+        (moving - hand(name, flight.state[CHI]))[:4] / 0.01, [0.0, 0.1, 0.05, 0.2], atol=4e-3
+    )
+    flight.step(25)  # the newest message is 0.05 s old
+    assert not flight.state[CHI_DOT].any()
+    there = hand(name, flight.state[CHI])
+    np.testing.assert_allclose(there[4:], begin[4:], atol=1e-3)
+    assert there[1] - begin[1] == pytest.approx(0.2, abs=0.02)
+    flight.until(lambda output: output.state is State.HOLDING)
+    flight.assert_smooth()
+
+
+def test_a_jog_is_slowed_down_to_its_limits_and_one_transition():
+    flight = hovering()
+    before = len(flight.mission.changes)
+    jogged(flight, twist("s500_arm", (3.0, 4.0, 0.0)), 1.0)
+    np.testing.assert_allclose(flight.state[CHI_DOT, :3], [0.09, 0.12, 0.0], atol=1e-4)
+    assert [one.event for one in flight.mission.changes[before:]] == [Event.GOAL]
+
+
+def test_a_jog_in_the_axes_of_the_tool():
+    flight = hovering("t650")
+    jogged(flight, twist("t650", (0.1, 0.0, 0.0), of_tool=True), 0.5)
+    lifted = hand("t650", flight.state[CHI])[4]
+    expected = 0.1 * np.array([math.cos(lifted), 0.0, math.sin(lifted)])
+    np.testing.assert_allclose(flight.state[CHI_DOT, :3], expected, atol=1e-3)
+
+
+def test_a_jog_ends_at_the_limits_of_the_base():
+    flight = hovering()
+    goal = twist("s500_arm", (0.0, 0.0, -0.15))
+    answers = set()
+    for _ in range(150):
+        accepted, text = flight.mission.plan(goal)
+        answers.add(accepted)
+        flight.step(5)
+        assert flight.state[CHI, 2] > 0.58 - 1e-9
+    assert answers == {True, False} and "z is" in text
+    flight.assert_smooth()
+
+
+def test_a_hold_ends_a_jog():
+    flight = hovering()
+    jogged(flight, twist("s500_arm", (0.1, 0.0, 0.0)), 1.0)
+    assert flight.mission.request(OperatorCommand.HOLD)[0]
+    flight.step(200)
+    assert flight.mission.output.state is State.HOLDING and not flight.state[CHI_DOT].any()

@@ -1,0 +1,125 @@
+"""Base and arm for a place of the end effector: the base level, the arm near a posture.
+
+The base does the place and the heading, so the arm keeps its posture. It leaves it, by the least
+change, where the base would leave its room, and for elevation and lean of the tool.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.arm.chain import Chain
+from uam_control.arm.hand import ELEVATION, HEADING, LEAN, least_change, tools
+from uam_control.coordinates import ALPHA, ARM, POSITION, YAW
+from uam_control.maths.rotations import wrap_angle
+
+BEYOND, TURNED = slice(0, 3), slice(3, 5)  # columns of what is off: [m], [rad]
+TILTS = [ELEVATION, LEAN]  # of TOOL
+MOVED = 1e-6  # [rad] of numerical derivatives
+CLOSE = 1e-8  # [m, rad] at which the search ends
+ROUNDS = 30
+LONGEST = 0.5  # [rad] of one step of a joint
+STARTS = 6  # further postures, from which one is sought
+
+
+class Placed(NamedTuple):
+    """chi (m, 6 + n) of level bases; off (m, 5): BEYOND, of the base from its room, and TURNED, of
+    the tool's elevation and lean from those wanted; zeros where all is met."""
+
+    chi: np.ndarray
+    off: np.ndarray
+
+
+def placed(
+    chain: Chain, wanted: np.ndarray, posture: np.ndarray, ranges: np.ndarray, room: np.ndarray
+) -> Placed:
+    """Return base and arm for tools at `wanted` (m, 6), columns TOOL; NaN: any elevation, lean.
+
+    posture (n,) [rad]; ranges (2, n) [rad] of the joints; room (2, 3) [m] of the base. One that is
+    not met from the posture on is sought from others, for a single tool.
+    """
+    count = len(posture)
+    found = _approached(chain, wanted, np.tile(posture, (len(wanted), 1)), ranges, room)
+    if len(wanted) > 1 or not np.any(np.abs(found.off) > CLOSE) or not count:
+        return found
+    shares = np.random.default_rng(0).uniform(size=(STARTS, count))
+    starts = ranges[0] + shares * (ranges[1] - ranges[0])
+    others = _approached(chain, np.repeat(wanted, STARTS, axis=0), starts, ranges, room)
+    off = np.linalg.norm(others.off, axis=1)
+    away = np.linalg.norm(others.chi[:, ARM] - posture, axis=1)
+    best = np.lexsort((away, np.where(off > CLOSE, off, 0.0)))[0]
+    better = off[best] < np.linalg.norm(found.off) - CLOSE
+    return Placed(others.chi[[best]], others.off[[best]]) if better else found
+
+
+def turning(chain: Chain, chi: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rates (6 + n,) of base and arm that move the tool, and what of it is not met.
+
+    chi (6 + n,), counted as level; rates (6,): of TOOL. Elevation and lean are the arm's, all else
+    is the base's. Not met (2,) [rad/s]: of elevation and lean.
+    """
+    level = chi.copy()
+    level[POSITION], level[YAW - 2 : YAW] = 0.0, 0.0
+    slopes = _slopes(chain, level)
+    found = np.zeros_like(chi)
+    if slopes.shape[1] and np.any(rates[TILTS]):
+        found[ARM] = least_change(slopes[None, TILTS], rates[None, TILTS])[0]
+    swung = slopes @ found[ARM]
+    found[YAW] = rates[HEADING] - swung[HEADING]
+    x, y, _ = tools(chain, level[None])[0, POSITION]
+    found[POSITION] = rates[POSITION] - swung[POSITION]
+    found[POSITION] -= found[YAW] * np.array([-y, x, 0.0])
+    return found, rates[TILTS] - swung[TILTS]
+
+
+def _slopes(chain: Chain, chi: np.ndarray) -> np.ndarray:
+    """Return the derivatives (6, n) of TOOL with respect to the joints, at chi (6 + n,)."""
+    joints = len(chi) - ALPHA
+    moved = np.tile(chi, (joints + 1, 1))
+    moved[1:, ARM] += MOVED * np.eye(joints)
+    found = tools(chain, moved)
+    change = found[1:] - found[0]
+    change[:, HEADING:] = wrap_angle(change[:, HEADING:])
+    return change.T / MOVED
+
+
+def _approached(
+    chain: Chain, wanted: np.ndarray, starts: np.ndarray, ranges: np.ndarray, room: np.ndarray
+) -> Placed:
+    """Return what is found from arms at `starts` (m, n) [rad] on, by least changes."""
+    angles, (rows, joints) = np.clip(starts, *ranges), starts.shape
+    steps = MOVED * np.vstack([np.zeros(joints), np.eye(joints)])
+    for _ in range(ROUNDS):
+        moved = (angles[:, None] + steps).reshape(-1, joints)
+        chi = _based(chain, np.repeat(wanted, joints + 1, axis=0), moved)
+        off = _off(chain, np.repeat(wanted, joints + 1, axis=0), chi, room)
+        off = off.reshape(rows, joints + 1, -1)
+        if np.abs(off[:, 0]).max() <= CLOSE:
+            break
+        slopes = ((off[:, 1:] - off[:, :1]) / MOVED).swapaxes(1, 2)
+        step = least_change(slopes, -off[:, 0])
+        ends = ((step < 0.0) & (angles <= ranges[0])) | ((step > 0.0) & (angles >= ranges[1]))
+        step = least_change(np.where(ends[:, None], 0.0, slopes), -off[:, 0])
+        longest = np.abs(step).max(axis=1, initial=LONGEST, keepdims=True)
+        angles = np.clip(angles + step * LONGEST / longest, *ranges)
+    chi = _based(chain, wanted, angles)
+    return Placed(chi, _off(chain, wanted, chi, room))
+
+
+def _based(chain: Chain, wanted: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return chi (m, 6 + n) of arms at angles (m, n) [rad] whose hands have place and heading."""
+    chi = np.zeros((len(angles), ALPHA + angles.shape[1]))
+    chi[:, ARM] = angles
+    chi[:, YAW] = wanted[:, HEADING] - tools(chain, chi)[:, HEADING]
+    chi[:, POSITION] = wanted[:, POSITION] - tools(chain, chi)[:, POSITION]
+    return chi
+
+
+def _off(chain: Chain, wanted: np.ndarray, chi: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Return what is off (m, 5), see `Placed`."""
+    off = np.zeros((len(chi), 5))
+    off[:, BEYOND] = chi[:, POSITION] - np.clip(chi[:, POSITION], *room)
+    off[:, TURNED] = np.nan_to_num(wrap_angle(tools(chain, chi)[:, TILTS] - wanted[:, TILTS]))
+    return off
