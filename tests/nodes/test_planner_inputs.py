@@ -190,13 +190,13 @@ def test_the_hand_is_commanded_by_pose_trajectory_and_twist(vehicle):
         atol=1e-9,
     )
 
-    for _ in range(40):  # 20 Hz
+    for _ in range(30):  # 20 Hz
         assert answer(vehicle, topics.END_EFFECTOR_TWIST, twist("end_effector", 0.1)).startswith(
             "acc"
         )
         vehicle.fly(12)
     assert vehicle.state[1, :2] == pytest.approx([0.1 * c, 0.1 * s], abs=1e-4)
-    vehicle.fly(63)  # with the last 12 ticks 0.3 s
+    vehicle.fly(113)  # with the last 12 ticks 0.5 s
     assert not vehicle.state[1].any()
 
     x, y, z = vehicle.state[0, :3] + [0.14 * c, 0.14 * s, -0.203]

@@ -215,16 +215,16 @@ def jogged(flight, goal, seconds, every=5):
 def test_a_jog_moves_the_hand_and_ends_when_the_messages_do(name):
     flight = hovering(name)
     begin, flight.references[:] = hand(name, flight.state[CHI]), []
-    jogged(flight, twist(name, (0.0, 0.1, 0.05), (0.0, 0.0, 0.2)), 2.0)
+    jogged(flight, twist(name, (0.0, 0.08, 0.04), (0.0, 0.0, 0.2)), 2.0)
     moving = hand(name, flight.state[CHI] + 0.01 * flight.state[CHI_DOT])
     np.testing.assert_allclose(
-        (moving - hand(name, flight.state[CHI]))[:4] / 0.01, [0.0, 0.1, 0.05, 0.2], atol=4e-3
+        (moving - hand(name, flight.state[CHI]))[:4] / 0.01, [0.0, 0.08, 0.04, 0.2], atol=4e-3
     )
-    flight.step(25)  # the newest message is 0.05 s old
+    flight.step(45)  # the newest message is 0.05 s old; a tick, until it counts
     assert not flight.state[CHI_DOT].any()
     there = hand(name, flight.state[CHI])
     np.testing.assert_allclose(there[4:], begin[4:], atol=1e-3)
-    assert there[1] - begin[1] == pytest.approx(0.2, abs=0.02)
+    assert there[1] - begin[1] == pytest.approx(0.16, abs=0.03)
     flight.until(lambda output: output.state is State.HOLDING)
     flight.assert_smooth()
 
@@ -233,13 +233,13 @@ def test_a_jog_is_slowed_down_to_its_limits_and_one_transition():
     flight = hovering()
     before = len(flight.mission.changes)
     jogged(flight, twist("s500_arm", (3.0, 4.0, 0.0)), 1.0)
-    np.testing.assert_allclose(flight.state[CHI_DOT, :3], [0.09, 0.12, 0.0], atol=1e-4)
+    np.testing.assert_allclose(flight.state[CHI_DOT, :3], [0.06, 0.08, 0.0], atol=1e-4)
     assert [one.event for one in flight.mission.changes[before:]] == [Event.GOAL]
 
 
 def test_a_jog_in_the_axes_of_the_tool():
     flight = hovering("t650")
-    jogged(flight, twist("t650", (0.1, 0.0, 0.0), of_tool=True), 0.5)
+    jogged(flight, twist("t650", (0.1, 0.0, 0.0), of_tool=True), 1.0)
     lifted = hand("t650", flight.state[CHI])[4]
     expected = 0.1 * np.array([math.cos(lifted), 0.0, math.sin(lifted)])
     np.testing.assert_allclose(flight.state[CHI_DOT, :3], expected, atol=1e-3)
@@ -247,7 +247,7 @@ def test_a_jog_in_the_axes_of_the_tool():
 
 def test_a_jog_ends_at_the_limits_of_the_base():
     flight = hovering()
-    goal = twist("s500_arm", (0.0, 0.0, -0.15))
+    goal = twist("s500_arm", (0.0, 0.0, -0.1))
     answers = set()
     for _ in range(150):
         accepted, text = flight.mission.plan(goal)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.arm.hand import hands
-from uam_control.control.hand_steering import HandParameters
+from uam_control.control.hand_steering import HandParameters, hardest
 from uam_control.stages.hand_stage import HandStage
 from uam_control.vehicle import chain_of, load_description
 
@@ -104,3 +104,44 @@ def test_on_the_ground_it_fades_out():
     after = flown(steered, state, 1, flying=False)[0, 6]
     assert abs(after) > 0.9 * abs(before)
     np.testing.assert_array_equal(flown(steered, state, 2000, flying=False), reference())
+
+
+def test_near_a_singular_posture_it_fades_out_and_says_so():
+    """A straight arm hangs: the hand cannot go up or down."""
+    steered, state = stage(**STEERED), off(x=0.02)
+    before = abs(flown(steered, state, 300)[0, 6])
+    assert before > 0.1 and steered.fades == ""
+    straight = reference()
+    straight[0, 7] = 0.0
+    beside = straight.copy()
+    beside[0, 0] += 0.02
+    for ticks, least in ((1, 0.9 * before), (2000, 0.0)):
+        for _ in range(ticks):
+            found = steered.update(beside, straight, True, False)
+        assert abs(found[0, 6]) >= least
+        assert steered.fades == "near a singular posture: hand_singular"
+    np.testing.assert_array_equal(found, straight)
+    assert abs(flown(steered, state, 300)[0, 6]) > 0.9 * before and steered.fades == ""
+
+
+def test_it_says_why_it_fades_out_where_it_is_on():
+    steered = stage(**STEERED)
+    flown(steered, off(x=0.3), 1)
+    assert steered.fades == "the hand is too far off: hand_error_max"
+    flown(steered, off(), 1, flying=False)
+    assert steered.fades == "on the ground, released, or in failsafe"
+    without = stage()
+    flown(without, off(x=0.3), 1)
+    assert without.fades == ""
+
+
+@pytest.mark.parametrize(("columns", "directions", "least"), [
+    ([(0.3, 0.0, 0.4)], 1, 0.5),
+    ([(0.3, 0.0, 0.0), (0.0, 0.0, 0.4)], 2, 0.24),  # sqrt(0.09 0.16 / 0.25)
+    ([(0.3, 0.0, 0.0), (0.6, 0.0, 0.0)], 2, 0.0),
+    ([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)], 3, math.sqrt(1.0 / 3.0)),
+])  # fmt: skip
+def test_the_hardest_direction_by_hand(columns, directions, least):
+    jacobian = np.zeros((6, len(columns)))
+    jacobian[:3] = np.array(columns).T
+    assert hardest(jacobian, directions) == pytest.approx(least, abs=1e-12)

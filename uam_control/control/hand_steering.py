@@ -36,7 +36,17 @@ from uam_control.settings.parameter_set import ParameterSet, number
 FADE = 0.5  # [s] in which the correction comes and goes
 RETURN = 4.0  # [rad/s] bandwidth of the way back to the reference, without a bandwidth of its own
 INSIDE = 0.1  # [rad] of the end of a joint's range; the supervisor holds up to 0.05 before it
-WHOLE, REAL = "has_hand", "bandwidth damping rate_max error_max weight period"
+# freedom: directions in which the hand moves; why: see FADES
+WHOLE = "has_hand freedom why"
+REAL = "bandwidth damping rate_max error_max singular weight period"
+# why the correction fades out, as text
+FADES = STEERS, IDLE, SINGULAR, FAR = range(4)
+TEXTS = {
+    STEERS: "",
+    IDLE: "on the ground, released, or in failsafe",
+    SINGULAR: "near a singular posture: hand_singular",
+    FAR: "the hand is too far off: hand_error_max",
+}
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,10 @@ class HandParameters(ParameterSet):
         0.0,
         1.0,
     )
+    hand_singular: float = number(
+        0.01, "motion of the hand in its hardest direction, below which the arm gives up", "m/rad",
+        0.0, 1.0,
+    )  # fmt: skip
 
 
 class HandArrays(NamedTuple):
@@ -91,7 +105,8 @@ def steer(
     if m.has_hand == 0 or (m.bandwidth == 0.0 and m.weight == 0.0 and not h.correction[0].any()):
         return
     error, away = _error(h, state, reference)
-    wanted = flying and m.bandwidth > 0.0 and away <= m.error_max
+    m.why = _why(h, flying, away)
+    wanted = m.bandwidth > 0.0 and m.why == STEERS
     m.weight = min(1.0, m.weight + dt / FADE) if wanted else max(0.0, m.weight - dt / FADE)
     if m.weight > 0.0 and away <= m.error_max:
         goal = _least(h, error, m.damping)
@@ -112,6 +127,39 @@ def steer(
         h.correction[0, i], h.correction[1, i] = after, (after - now) / dt
         h.reference[CHI, ALPHA + i] += after
         h.reference[CHI_DOT, ALPHA + i] += h.correction[1, i]
+
+
+@jit
+def _why(h: HandArrays, flying: bool, away: float) -> int:
+    """Return which of FADES counts, for a hand that is `away` [m] from its place."""
+    m = h.numbers[0]
+    if not flying:
+        return IDLE
+    if away > m.error_max:
+        return FAR
+    return SINGULAR if hardest(h.jacobian, m.freedom) < m.singular else STEERS
+
+
+@jit
+def hardest(jacobian: np.ndarray, freedom: int) -> float:
+    """Return how far the hand moves in its hardest direction [m/rad], at least.
+
+    jacobian (6, n); freedom: in how many directions it moves. Of the eigenvalues of J J^T, the
+    smallest that counts is at least the ratio of two elementary symmetric polynomials of them.
+    """
+    square = np.zeros((3, 3))
+    for i in range(jacobian.shape[1]):
+        for j in range(3):
+            for k in range(3):
+                square[j, k] += jacobian[j, i] * jacobian[k, i]
+    a, b, c = rows(square)
+    first = a[0] + b[1] + c[2]
+    second = a[0] * b[1] - a[1] * b[0] + a[0] * c[2] - a[2] * c[0] + b[1] * c[2] - b[2] * c[1]
+    if freedom < 2 or first <= 0.0:
+        return math.sqrt(max(0.0, first))
+    if freedom == 2 or second <= 0.0:
+        return math.sqrt(max(0.0, second / first))
+    return math.sqrt(max(0.0, dot(a, cross(b, c)) / second))
 
 
 @jit

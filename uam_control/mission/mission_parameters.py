@@ -58,15 +58,15 @@ class HandLimits(ParameterSet):
     """Limits of what the end effector is commanded, in addition to those of plans."""
 
     hand_floor: float = number(0.0, "lowest height of the hand's goals", "m", -1e4, 1e4)
-    jog_speed: float = number(0.15, "largest speed of a jog", "m/s", 0.01, 1.0)
+    jog_speed: float = number(0.1, "largest speed of a jog", "m/s", 0.01, 1.0)
     jog_turn_rate: float = number(0.2, "largest turn rate of a jog", "rad/s", 0.01, 2.0)
     jog_acceleration: float = number(
-        1.0, "largest acceleration when the speed of a jog changes", "m/s^2", 0.05, 5.0
+        0.5, "largest acceleration when the speed of a jog changes", "m/s^2", 0.05, 5.0
     )
     jog_hold: float = number(
-        0.1, "age of a jog's message from which on it slows down", "s", 0.01, 1.0
+        0.05, "age of a jog's message from which on it slows down", "s", 0.01, 1.0
     )
-    jog_stop: float = number(0.18, "time in which it then stops", "s", 0.05, 2.0)
+    jog_stop: float = number(0.44, "time in which it then stops", "s", 0.05, 2.0)
 
 
 @dataclass(frozen=True)

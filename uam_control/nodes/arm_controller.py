@@ -4,6 +4,7 @@ or goal positions."""
 import numpy as np
 
 from uam_control.control.controllers import ArmController
+from uam_control.control.hand_steering import IDLE, TEXTS
 from uam_control.control.output_limits import ArmLimits
 from uam_control.coordinates import ARM
 from uam_control.nodes.controller_node import ControllerNode
@@ -12,6 +13,7 @@ from uam_control.vehicle import POSITION_SERVO
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import TorqueWriter
 from uam_msgs_py.messages.convert import JointCommandWriter
+from uam_msgs_py.messages.status import WARN
 from uam_msgs_py.node.base_node import run
 
 NAME = "arm_controller"
@@ -39,6 +41,14 @@ class ArmControllerNode(ControllerNode):
 
     def reference_of(self, state: np.ndarray, reference: np.ndarray, flying: bool) -> np.ndarray:
         return self.hand.update(state, reference, flying, self.controller.saturated)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        level, summary, values = super().diagnose()
+        fades, on = self.hand.fades, self.parameter_set.current.hand_bandwidth > 0.0
+        if fades and fades != TEXTS[IDLE]:
+            level, summary = max(level, WARN), f"the hand's stabilisation fades out: {fades}"
+        told = (f"fades out: {fades}" if fades else "acts") if on else "off"
+        return level, summary, values | {"hand's stabilisation": told}
 
     def answer(self) -> None:
         self._servos.publish(self._servo_writer.fill(self.controller.command))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.arm.chain import Chain, ChainParameters
+from uam_control.arm.hand import freedom
 from uam_control.control.hand_steering import (
+    IDLE,
     INSIDE,
     REAL,
+    TEXTS,
     WHOLE,
     HandArrays,
     HandParameters,
@@ -33,7 +36,8 @@ class HandStage:
         """period [s] of a tick; joints: of the arm; vehicle: without one there is no hand."""
         chain, ranges = _arm(vehicle)
         numbers = record(WHOLE, REAL)
-        numbers["has_hand"], numbers["period"] = chain.has_hand, period
+        numbers["has_hand"], numbers["period"], numbers["why"] = chain.has_hand, period, IDLE
+        numbers["freedom"] = freedom(chain) if chain.has_hand else 0
         size = 6 + joints
         self.arrays = HandArrays(
             *(chain, ranges, np.zeros((2, joints)), np.zeros(size), np.zeros((6, joints))),
@@ -56,6 +60,7 @@ class HandStage:
         numbers["damping"] = parameters.hand_damping
         numbers["rate_max"] = parameters.hand_joint_rate
         numbers["error_max"] = parameters.hand_error_max
+        numbers["singular"] = parameters.hand_singular
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, saturated: bool
@@ -63,6 +68,12 @@ class HandStage:
         """Return the reference (3, 6 + n) of the arm law; see `steer`."""
         self._steer(state, reference, flying, saturated)
         return self.arrays.reference
+
+    @property
+    def fades(self) -> str:
+        """Why the correction fades out, "" while it acts, or if there is none."""
+        one = self.arrays.numbers[0]
+        return TEXTS[int(one["why"])] if one["has_hand"] and one["bandwidth"] else ""
 
 
 def _arm(vehicle: VehicleDescription | None) -> tuple[Chain, np.ndarray]:

@@ -1,0 +1,195 @@
+"""Send random goals to the hand in the direct engine: reached, or refused with the right reason?
+
+    python benchmarks/hand_goals.py               # 200 goals inside, 30 outside, three vehicles
+    python benchmarks/hand_goals.py --goals 10 --vehicle t650
+    python benchmarks/hand_goals.py --jog         # how long the hand moves after the last twist
+
+A goal inside is the pose of the tool of a random base and random joints within their ranges, up to
+REACH from the place before; every second one is a place and a heading alone. It counts as reached
+with the true hand within 5 mm and 1 deg, SETTLE after its plan has ended. A goal outside is below
+the floor, beyond the room of the base and the reach of the arm, or has no finite place. The
+hand of a vehicle whose hand hangs is where its hinge has it. Calm plant, seed 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections import Counter
+
+import numpy as np
+
+from uam_control.arm.hand import HEADING, reach, tools
+from uam_control.coordinates import ARM, CHI, POSITION, YAW, Z
+from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.hand_goals import HandPose, HandTwist
+from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.plan_limits import room
+from uam_control.supervision import State
+from uam_lab.flights.direct.flight import DirectFlight
+from uam_lab.flights.flight_settings import settings
+from uam_sim_bridge.plant import Vehicle
+
+VEHICLES = ("s500_arm", "s500_arm3", "t650")
+GOALS = 200
+REACH, SETTLE = 0.5, 2.5  # [m], [s]
+NEAR, TURNED = 0.005, math.radians(1.0)
+STILL = 0.01  # [m/s] of a hand that has stopped
+
+
+class Hovering:
+    """A flight in the direct engine that hovers and takes goals."""
+
+    def __init__(self, name: str) -> None:
+        s = settings("hover", vehicle=name, engine="direct", seed=1)
+        self.vehicle, self.flyer = s.vehicle, Flyer.of(s.vehicle)
+        vehicle = Vehicle.of(s.vehicle).changed(s.vehicle_changes)
+        self._flight = DirectFlight(s.scenario, s.profile, vehicle, s.payload_mass, s.seed)
+        self.limits = s.profile.sets["mission"]
+        self.period = self._flight.plant.period
+        self.ground = math.nan
+        self.run(7.0)
+        self.ask(HandPose(self.flyer, np.array([*self.reference[POSITION], *[math.nan] * 3])))
+
+    def run(self, seconds: float) -> None:
+        """Fly on."""
+        for _ in range(round(seconds / self.period)):
+            self._flight.tick()
+            if math.isnan(self.ground) and self._flight.mission.output.flying:
+                self.ground = float(self.reference_of_base[Z])
+
+    def ask(self, goal: HandPose | HandTwist) -> tuple[bool, str]:
+        """Send a goal; return whether it is accepted, and the answer."""
+        return self._flight.mission.plan(goal)
+
+    def arrive(self) -> None:
+        """Fly to the end of the plan, and SETTLE longer."""
+        output = self._flight.mission.output
+        self.run(self.period * 2)
+        while output.state is State.FLYING:
+            self.run(0.1)
+        assert output.state is State.HOLDING, output
+        self.run(SETTLE)
+
+    @property
+    def reference_of_base(self) -> np.ndarray:
+        """chi (6 + n,) of the reference."""
+        return self._flight.mission.output.reference[CHI]
+
+    @property
+    def reference(self) -> np.ndarray:
+        """TOOL (6,) of the reference."""
+        return tools(self.flyer.chain, self.reference_of_base[None])[0]
+
+    @property
+    def hand(self) -> np.ndarray:
+        """TOOL (6,), true."""
+        recording = self._flight.recording
+        row = recording.values[recording.count - 1]
+        chi = row[recording.columns.block("truth.")][: len(self.reference_of_base)]
+        swing = row[[recording.columns["magnet.swing"]]]
+        return tools(self.flyer.chain, chi[None], swing)[0]
+
+
+def inside(flight: Hovering, rng: np.random.Generator, heading_only: bool) -> np.ndarray:
+    """Return TOOL (6,) of a pose that the vehicle can have."""
+    low, high = flight.limits.joint_ranges
+    corners = room(flight.limits, flight.ground)
+    chi = flight.reference_of_base.copy()
+    chi[POSITION] = np.clip(chi[POSITION] + rng.uniform(-REACH, REACH, 3), *corners)
+    chi[YAW], chi[ARM] = rng.uniform(-math.pi, math.pi), rng.uniform(low, high)
+    wanted = tools(flight.flyer.chain, chi[None])[0]
+    if heading_only:
+        wanted[HEADING + 1 :] = math.nan
+    return wanted
+
+
+def outside(flight: Hovering, rng: np.random.Generator) -> tuple[np.ndarray, str]:
+    """Return a pose that no vehicle can have, and the reason."""
+    wanted = inside(flight, rng, True)
+    kind, far = rng.integers(4), reach(flight.flyer.chain) + rng.uniform(0.5, 3.0)
+    corners = room(flight.limits, flight.ground)
+    if kind == 0:
+        wanted[Z] = flight.limits.hand_floor - rng.uniform(0.01, 2.0)
+    elif kind == 1:
+        axis, side = rng.integers(3), rng.integers(2)
+        wanted[axis] = corners[side, axis] + (far if side else -far)
+    elif kind == 2:
+        wanted[rng.integers(3)] = rng.choice([math.nan, math.inf])
+        return wanted, "not finite"
+    else:
+        wanted[4:] = 0.0, rng.choice([-1.0, 1.0]) * rng.uniform(1.42, 1.55)
+        return wanted, "singular"
+    return wanted, "out of reach"
+
+
+def goals(name: str, count: int) -> None:
+    """Print how the goals of a vehicle end."""
+    flight, rng, ends = Hovering(name), np.random.default_rng(1), Counter()
+    distances, turns = [], []
+    for number in range(count):
+        wanted = inside(flight, rng, number % 2 == 0)
+        accepted, text = flight.ask(HandPose(flight.flyer, wanted))
+        if not accepted:
+            ends[text.partition(":")[2].strip().partition(":")[0]] += 1
+            print(f"  {name} {number}: {text}", flush=True)
+            continue
+        flight.arrive()
+        off = flight.hand - wanted
+        off[HEADING:] = np.nan_to_num(wrap_angle(off[HEADING:]))
+        distances.append(float(np.linalg.norm(off[POSITION])))
+        turns.append(float(np.abs(off[HEADING:]).max()))
+        met = distances[-1] <= NEAR and turns[-1] <= TURNED
+        ends["reached" if met else "missed"] += 1
+        if not met:
+            print(
+                f"  {name} {number}: {1e3 * distances[-1]:.1f} mm {np.degrees(off[HEADING:])} deg"
+            )
+    right = 0
+    for _ in range(max(1, count * 30 // GOALS)):
+        wanted, reason = outside(flight, rng)
+        accepted, text = flight.ask(HandPose(flight.flyer, wanted))
+        right += not accepted and reason in text
+    outsiders = f"{right} of {max(1, count * 30 // GOALS)} outside refused with the right reason"
+    worst = 1e3 * max(distances, default=0.0), math.degrees(max(turns, default=0.0))
+    print(f"{name}: {dict(ends)}; worst {worst[0]:.1f} mm, {worst[1]:.2f} deg; {outsiders}")
+
+
+def jog(name: str) -> None:
+    """Print how long the true hand moves after the last of the twists."""
+    flight = Hovering(name)
+    speed = flight.limits.jog_speed
+    for axis in np.eye(3):
+        for _ in range(40):
+            flight.ask(HandTwist(flight.flyer, speed * axis, np.zeros(3)))
+            flight.run(0.05)
+        before, stopped, speeds = flight.hand, 0.0, []
+        for _ in range(round(1.5 / flight.period)):
+            flight.run(flight.period)
+            now = flight.hand
+            speeds.append(float(np.linalg.norm((now - before)[POSITION])) / flight.period)
+            before = now
+        for part in np.nonzero(np.array(speeds) > STILL)[0][-1:]:
+            stopped = (part + 1) * flight.period + 0.05
+        at = speeds[round(0.25 / flight.period)]
+        print(f"{name}, {axis}: {1e3 * at:.0f} mm/s 0.3 s after the last twist; below "
+              f"{1e3 * STILL:.0f} mm/s from {stopped:.2f} s on")  # fmt: skip
+        flight.run(1.0)
+
+
+def main() -> None:
+    """Run."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--vehicle", nargs="+", default=VEHICLES, help="names or files")
+    parser.add_argument("--goals", type=int, default=GOALS, help=f"of each vehicle ({GOALS})")
+    parser.add_argument("--jog", action="store_true", help="the stop of a jog in place of goals")
+    options = parser.parse_args()
+    for name in options.vehicle:
+        if options.jog:
+            jog(name)
+        else:
+            goals(name, options.goals)
+
+
+if __name__ == "__main__":
+    main()
