@@ -45,7 +45,8 @@ def read_hand_trajectory(data: bytes, flyer: Flyer | None) -> HandPoints:
         if not is_given(*quaternion):
             raise BadMessage(f"point {i}: the rotation is no quaternion")
         wanted[i, 3:] = _angles(*quaternion)
-    if np.ptp(np.isnan(wanted[:, LEAN])) if len(wanted) else False:
+    free = np.isnan(wanted[:, LEAN])
+    if free.any() and not free.all():
         raise BadMessage("some points have an elevation and some have none: all or none expected")
     return HandPoints(_with_hand(flyer), body.times, wanted, body.rates)
 

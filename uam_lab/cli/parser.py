@@ -26,6 +26,7 @@ COMMANDS = {
     "fly": "fly",
     "rehearse": "rehearse",
     **dict.fromkeys(OPERATE, "operate"),
+    "teleop": "teleop",
     "checklist": "checklist",
     "view": "view",
     "profile": "profile",

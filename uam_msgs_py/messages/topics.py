@@ -17,8 +17,8 @@ from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Imu, JointState, Temperature
-from std_msgs.msg import Bool, Float64MultiArray, String
+from sensor_msgs.msg import BatteryState, Imu, JointState, Joy, Temperature
+from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
@@ -225,6 +225,11 @@ END_EFFECTOR_TRAJECTORY = Topic("end_effector/trajectory", MultiDOFJointTrajecto
 END_EFFECTOR_TWIST = Topic("end_effector/twist", TwistStamped, PLANS, "world or end_effector",
     "m/s, rad/s", "10 Hz or more", "teleop, planners", readers=MISSION, one_publisher=False,
     about="jog of the end effector; it stops when silent")
+GRIPPER_COMMAND = Topic("gripper/command", Float64, PLANS, "", "m, or 0/1", ON_CHANGE,
+    "teleop, your program", readers="your gripper", one_publisher=False,
+    about="opening of a two-finger gripper, a magnet 0/1")
+JOY = Topic("joy", Joy, SENSOR_DATA, "", "-1..1, 0 or 1", "of the gamepad", "joy_node",
+    readers="teleop", one_publisher=False, recorded=False, about="axes and buttons of a gamepad")
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic("uam/parameter_changes", DiagnosticArray, _qos(1000, latched=True), "", TEXT,
