@@ -7,6 +7,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from uam_control.coordinates import coordinates
+from uam_lab.cockpit.scene import HAND_NAMES
 from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
@@ -108,6 +109,10 @@ def test_frames_urdf_and_markers_of_a_simulated_flight(start, probe):
     _, position, velocity = read_joints(rig.errors[-1], list(COORDINATES))
     assert position.round(9).tolist() == [-0.2, 0, 0, 0.1, 0, 0, 0, -0.5]
     assert velocity.round(9).tolist() == [0, 0, 0, 0, -0.2, 0, 0, 0]
+    _, hand, swept = read_joints(rig.errors[-1], HAND_NAMES)
+    # 0.1 rad of roll move the hand, which hangs 0.2 to 0.4 m below, to the left
+    assert -0.4 < hand[0] < 0.0 and 0.02 < hand[1] < 0.04
+    assert swept[0] > 0.02  # -0.2 rad/s of pitch
     probe.until(lambda: any(m.text == "hover" for m in rig.markers[-1].markers), "the phase")
     assert {"payload", "magnet", "reference path"} <= {m.ns for m in rig.markers[-1].markers}
     assert rig.node.interrupt() == 0 and "Traceback" not in rig.node.output
@@ -121,6 +126,7 @@ def test_on_hardware_there_is_no_truth(start, probe):
     assert "payload" not in {m.ns for m in rig.markers[-1].markers}
     _, position, _ = read_joints(rig.errors[-1], list(COORDINATES))
     assert position.round(9).tolist() == [0, 0, 0, 0, 0, 0, 0, -0.5], "on the ground: the arm alone"
+    assert not np.any(read_joints(rig.errors[-1], HAND_NAMES)[1])
 
 
 def test_alone_it_waits_for_the_mission_and_listens_to_nothing_else(start, probe):

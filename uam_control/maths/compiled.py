@@ -8,14 +8,21 @@ The code stays plain Python. Without numba, or with NUMBA_DISABLE_JIT=1 in the e
 debuggers and coverage), every function runs in Python and gives the same numbers up to rounding.
 """
 
+import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
 try:
     import numba
+    from numba.core.errors import NumbaExperimentalFeatureWarning
     from numba.core.options import DefaultOptions
 
     from uam_control.maths.compile_cache import CompileCache
+
+    # a function that is compiled for a record is used for one that has more fields behind the same
+    warnings.filterwarnings(
+        "ignore", ".*considered a subtype", category=NumbaExperimentalFeatureWarning
+    )
 except ImportError:
     numba = DefaultOptions = None
 

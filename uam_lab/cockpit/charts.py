@@ -99,8 +99,10 @@ class Charts:
         window: float,
         interval: float,
         joints: Sequence[str],
+        hand: bool,
     ):
-        """window: shown time [s]; interval: between samples [s]; joints: their names."""
+        """window: shown time [s]; interval: between samples [s]; joints: their names; hand: whether
+        there is an end effector."""
         self._gui, self._window, self._interval = gui, window, interval
         self._joints = len(joints)
         self._adaptation: dict[Topic, StripChart] = {}
@@ -108,6 +110,7 @@ class Charts:
             self._position = self._chart("Position error [cm]", XYZ)
             self._attitude = self._chart("Attitude error [deg]", RPY)
             self._arm = self._chart("Arm error [deg]", joints)
+            self._hand = self._chart("End effector error [mm]", XYZ) if hand else None
         with panel.add_tab("Inputs", viser.Icon.BOLT):
             self._force = self._chart("tau_p [N, world]", XYZ)
             self._torque = self._chart("tau_q [N m, body]", RPY)
@@ -126,7 +129,10 @@ class Charts:
             time, error = _time(message), message.position
             self._position.add(time, [100.0 * value for value in error[POSITION]])
             self._attitude.add(time, [DEGREES * value for value in error[ATTITUDE]])
-            self._arm.add(time, [DEGREES * value for value in error[ARM]])
+            arm, hand = np.split(np.array(error[ARM]), [self._joints])
+            self._arm.add(time, list(DEGREES * arm))
+            if self._hand is not None and len(hand):
+                self._hand.add(time, list(1e3 * hand))
         elif topic is topics.POSITION_COMMAND:
             self._force.add(_time(message), _effort(message, 3))
         elif topic is topics.ATTITUDE_COMMAND:

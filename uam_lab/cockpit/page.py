@@ -100,7 +100,9 @@ class Page:
             options["window"],
             options["sample_interval"],
             vehicle.coordinates[ARM],
+            bool(vehicle.end_effector),
         )
+        self._coordinates = vehicle.coordinates
         self._panel.dock_right()
         self._panel.set_width(RIGHT_WIDTH)
         self._tabs = {name: self._panel.add_tab(title) for name, title in TUNED.items()}
@@ -179,7 +181,7 @@ class Page:
         else:
             self._charts.show(topic, message)
         if topic is topics.TRACKING_ERROR:
-            health.track(np.array(message.position))
+            health.track(np.array(message.position[: len(self._coordinates)]))
 
     def _see_mission(self, mission: MissionStatus) -> None:
         """Take the mission's status, and say its answer to a goal."""

@@ -22,11 +22,14 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
-from uam_control.coordinates import ALPHA, ANGLES, ARM, ATTITUDE, CHI, CHI_DDOT, POSITION
+from uam_control.arm.chain import Chain
+from uam_control.arm.hand import hand_in_world
+from uam_control.coordinates import ALPHA, ANGLES, ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.nodes.described import described_scenario, described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
+from uam_control.vehicle import chain_of
 from uam_lab.cockpit.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -59,6 +62,10 @@ class SceneParameters(ParameterSet):
 
     frame_rate: float = number(25.0, "transforms per second of the messages' time", "Hz", 1.0, 60.0)
     marker_rate: float = number(2.0, "markers, likewise, unless they change", "Hz", 0.1, 25.0)
+
+
+HAND_NAMES = tuple(f"end_effector_{axis}" for axis in "xyz")  # of the error's entries
+STEP = 1e-4  # [s] of the numerical derivative of the hand's place
 
 
 class SceneNode(UamNode):
@@ -101,7 +108,9 @@ class SceneNode(UamNode):
         self._tf = self.publisher(topics.TF)
         self._markers = self.publisher(topics.MARKERS)
         self._error = self.publisher(topics.TRACKING_ERROR)
-        self._error_writer = JointStateWriter(described.coordinates, WORLD)
+        self._chain = chain_of(described)
+        hand = HAND_NAMES if self._chain.has_hand else ()
+        self._error_writer = JointStateWriter((*described.coordinates, *hand), WORLD)
         self._describe(urdf(vehicle), end_effector(model, described.end_effector))
         self.listen(topics.MISSION_STATUS, self._on_status)
         # other topics are polled when a status arrives or after `wake_up`
@@ -179,8 +188,10 @@ class SceneNode(UamNode):
         error[CHI, ANGLES] = wrap_angle(error[CHI, ANGLES])
         if not reference.flying:
             error[:, :ALPHA] = 0.0
+        hand = _hand_error(self._chain, state, desired) if reference.flying else np.zeros((2, 3))
         writer = self._error_writer
-        writer.position[:], writer.velocity[:] = error
+        kept = len(writer.position)  # with or without the hand
+        writer.position[:], writer.velocity[:] = np.hstack([error, hand])[:, :kept]
         self._error.publish(writer.stamped(stamp))
 
     def _transforms(
@@ -233,6 +244,19 @@ class SceneNode(UamNode):
         status = self._status[1]
         level = ERROR if status.abort_reason else OK
         return level, f"showing {status.summary}", {"payload": self._payload_is_there}
+
+
+def _hand_error(chain: Chain, state: np.ndarray, desired: np.ndarray) -> np.ndarray:
+    """Return the error of the end effector (2, 3) [m, m/s], world; state, desired: (2+, 6 + n)."""
+
+    def hand(chi: np.ndarray) -> np.ndarray:
+        return np.array(hand_in_world(chain, chi)[0])
+
+    def velocity(of: np.ndarray) -> np.ndarray:
+        ahead, behind = (hand(of[CHI] + step * of[CHI_DOT]) for step in (STEP, -STEP))
+        return (ahead - behind) / (2.0 * STEP)
+
+    return np.array([one(state) - one(desired) for one in (lambda of: hand(of[CHI]), velocity)])
 
 
 def _store(ticks: dict[int, Any], stamp: int, value: Any) -> None:

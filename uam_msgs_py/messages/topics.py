@@ -261,8 +261,8 @@ TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, BODY, POSE, ONCE, SCENE, rea
     one_publisher=False, about="fixed frames")
 TRACKING_ERROR = Topic("uam/tracking/error", JointState, RELIABLE, WORLD, "m, rad; /s", FRAMES,
     SCENE, readers="viewers", one_publisher=False,
-    about="estimate - reference: chi, chi_dot; attitude: from q_d of the position law; 0 "
-    "without a reference")
+    about="estimate - reference: chi, chi_dot, then the end effector; attitude: from q_d of the "
+    "position law; 0 without a reference")
 MARKERS = Topic("uam/markers", MarkerArray, LATCHED, WORLD, "m", "2 Hz and on change", SCENE,
     readers="viewers", one_publisher=False, about="paths, payload, magnet, phase")
 
