@@ -93,7 +93,7 @@ def test_theta_hat_turns_with_the_heading_where_it_is_asked_for(frame, adapt):
     law = dict.fromkeys(("lambda_1", "lambda_2", "lambda_table", "inertia", "bias_gain"), 1.0)
     values = {name: [value] * 3 for name, value in law.items()}
     values |= {"q_position": [1.0] * 3, "q_velocity": [1.0] * 3, "k_initial": [1.0] * 4}
-    values |= {"nu": [1.0] * 4, "bias_frame": frame, "adapt": adapt}
+    values |= {"nu": [1.0] * 4, "bias_frame": frame, "adapt": adapt, "bias_limit": 9.0}
     kind = controller_parameters(ModularParameters, PositionLimits)
     controller, (state, reference, _) = PositionController(kind.from_mapping(values, 3)), vehicle()
     controller.law.bias[:] = 2.0, 1.0, 3.0

@@ -23,8 +23,8 @@ from uam_control.control.output_limits import (
 )
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA, CHI, CHI_DOT, YAW
-from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW
+from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays
 from uam_control.maths.compiled import jit
 
@@ -67,8 +67,9 @@ PREDICTION = "measured ahead prediction nominal"
 
 class AttitudeArrays(NamedTuple):
     """Of the `AttitudeController`. load, turn (3,) [rad/s^2]: its moment per inertia (3,)
-    [kg m^2]; washout, slow (3,): see `wash_out`; prediction (1,): see PREDICTION, and whether the
-    delay counts."""
+    [kg m^2]; washout, slow (3,): see `wash_out`; turning: whether there are desired body rates;
+    measured: whether the load is that of the measured angles; prediction (1,): see PREDICTION, and
+    whether the delay counts."""
 
     all: ControllerArrays
     load: ArmLoad
@@ -76,6 +77,8 @@ class AttitudeArrays(NamedTuple):
     inertia: np.ndarray
     washout: np.ndarray
     slow: np.ndarray
+    turning: bool
+    measured: bool
     torque_max: np.ndarray
     prediction: np.ndarray
 
@@ -122,9 +125,16 @@ def begin_attitude(
 ) -> None:
     """Write the errors of the attitude law: tracking errors, arm's moment, prediction."""
     begin_law(a.all, state, reference, attitude_reference, True)
+    if not a.turning:
+        for i in range(ROLL, ALPHA):
+            a.all.errors[E_DOT, i], a.all.errors[FEEDFORWARD, i] = state[CHI_DOT, i], 0.0
     if a.load.on:
         # the law's own inertia, that of vehicle and arm, has the angular acceleration already
-        moment = arm_load(a.load, reference, False)
+        motion = reference
+        if a.measured:
+            motion = reference.copy()
+            motion[CHI, ALPHA:] = state[CHI, ALPHA:]
+        moment = arm_load(a.load, motion, False)
         for i in range(3):
             a.turn[i] = moment[i] / a.inertia[i]
     lead_attitude(a.all.errors, a.prediction[0].ahead, a.turn, a.washout, dt, a.slow)

@@ -28,6 +28,8 @@ from uam_control.control.around_law import (
 )
 from uam_control.control.output_limits import (
     HEADING,
+    REFERENCE,
+    STATE,
     ArmLimits,
     AttitudeLimits,
     ForceCompletion,
@@ -225,7 +227,8 @@ class AttitudeController(Controller):
         self.measured(now["measured"].item())
         arrays = AttitudeArrays(
             *(of_all, p.load(), np.zeros(3), np.array(p.inertia, dtype=float)),
-            *(np.array(p.feedforward_washout, dtype=float), self._slow),
+            *(np.array(p.feedforward_washout, dtype=float), self._slow, bool(p.rate_reference)),
+            p.load_from == STATE,
             *(np.array(p.torque_max, dtype=float), now),
         )
         rows = self._errors
@@ -289,7 +292,7 @@ class ArmController(Controller):
             *(of_all, p.load(), np.array(p.inertia, dtype=float)),
             np.array(p.integral_gain, dtype=float),
             *(float(p.integral_limit), self._integral, np.array(p.torque_max, dtype=float)),
-            *(self.command, to_goals, p.goal_from == "reference", float(p.goal_compliance)),
+            *(self.command, to_goals, p.goal_from == REFERENCE, float(p.goal_compliance)),
             self._hold.memory,
         )
         rows = self._errors

@@ -29,6 +29,7 @@ RESERVE = 0.2  # of thrust_max, for the horizontal force if the vertical one tak
 
 LONGEST_PREDICTION = 0.1  # [s]
 WORLD, HEADING = "world", "heading"  # frames of the position's theta_hat
+REFERENCE, STATE = "reference", "state"
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,9 @@ class ArmLimits(TorqueLimits, ArmLoadParameters, HandParameters):
         fixed=True,
     )
     goal_from: str = choice(
-        "reference",
+        REFERENCE,
         "goal positions: tau_alpha goal_compliance is added to the reference, or to the state",
-        ("reference", "state"),
+        (REFERENCE, STATE),
     )
     goal_compliance: float = number(
         0.0, "goal offset per torque; 0: the arm law does not act", "rad/(N m)", 0.0, 100.0
@@ -135,6 +136,15 @@ class AttitudeLimits(TorqueLimits, ArmLoadParameters):
     )
     prediction_nominal: float = number(
         0.007, "loop delay of a link without delay, as delay_nominal of the mission", "s", 0.0, 1.0
+    )
+    load_from: str = choice(
+        REFERENCE,
+        "the arm's moment is that of the reference, or of the measured angles, as where the arm "
+        "stabilises the hand",
+        (REFERENCE, STATE),
+    )
+    rate_reference: bool = switch(
+        True, "false: e_dot is Omega alone, without desired body rates and accelerations"
     )
     feedforward_washout: tuple = vector(
         (0.0, 0.0, 0.0),

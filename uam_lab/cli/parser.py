@@ -32,6 +32,7 @@ COMMANDS = {
     "profile": "profile",
     "report": "report",
     "compare": "compare",
+    "duel": "duel",
     "tune": "tune",
     "campaign": "campaign",
     "faults": "faults",

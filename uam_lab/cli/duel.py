@@ -1,0 +1,67 @@
+"""`uam duel`: laws over the tasks of another laboratory, beside its published figures."""
+
+from __future__ import annotations
+
+import argparse
+
+from uam_lab.cli.command import Command, Subcommands, count, place_of
+from uam_lab.flights.conclude import command_line
+from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.result_folder import make_folder
+from uam_lab.records.results.terminal import say
+
+EXAMPLES = """\
+examples:
+  uam duel                              every row, three seeds: some 400 flights
+  uam duel --seeds 1 --rows "default, hand"
+  uam duel mine.yaml --out mine         a file as config/duel/t650.yaml; a stopped duel continues
+
+Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
+"""
+
+
+def add(commands: Subcommands) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "duel",
+        run,
+        "laws over another laboratory's tasks, beside its published figures",
+        "Fly every row of a duel over its tasks on its plant; write the errors of end effector, "
+        "platform and heading beside the published ones, standing offset and survived delay.",
+        EXAMPLES,
+    )
+    text = "a duel of config/duel, or a file (default: t650)"
+    command.option("name", "NAME|FILE", text, "t650", nargs="?")
+    command.option("--seeds", "N", "seeds 1..N (default: the duel's)", type=count)
+    command.option("--rows", "LABEL", "rows that fly (default: all)", nargs="+")
+    command.workers()
+    command.out()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly, then write the tables; return the exit status."""
+    from uam_lab.experiments.duel import report
+    from uam_lab.experiments.duel.flights import ROWS, load_duel, measure, trials
+    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.inputs import inputs
+
+    duel = load_duel(options.name, tuple(options.rows or ()))
+    seeds = options.seeds or duel.seeds
+    planned = list(trials(duel, seeds))
+    profiles = [(label, one.sets, one.bridge()) for label, one in duel.rows.items()]
+    given = {"profiles": profiles, "plant": duel.plant, "scenarios": duel.scenarios, "seeds": seeds}
+    out = make_folder(options.out, "duel")
+    table = out / "flights.parquet"
+    of = inputs(duel.vehicle, duel.hover, given)
+    experiment = Experiment("duel", table, ROWS, of, place_of(options), measure)
+    found = experiment.fly(range(len(planned)), planned.__getitem__, _about)
+    text = report.text(duel, list(found.values()))
+    write_text(out / "tables.md", f"{text}\nMade by `{command_line()}`.\n")
+    say(text)
+    say(f"results  {out}")
+    return 0
+
+
+def _about(result: object) -> str:
+    return f"{result.row}, {result.scenario}, seed {result.seed}"

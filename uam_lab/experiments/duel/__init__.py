@@ -1,0 +1,1 @@
+"""`uam duel`: laws over the tasks of another laboratory, beside its published figures."""

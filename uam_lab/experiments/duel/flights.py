@@ -1,0 +1,159 @@
+"""The flights of a duel: each row in each scenario, and what is measured of one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.laws import catalogue
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import Profile, default_profile, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
+from uam_control.vehicle import VehicleDescription, load_description
+from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify
+from uam_lab.experiments.trials.rows import Rows
+from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
+from uam_lab.records.results.timeseries import Series
+from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
+from uam_sim_bridge.plant.effects import presets
+
+SETTLED = 0.5  # share of a hover that counts as standing: its second half
+MILLI = 1e3
+
+
+@dataclass(frozen=True)
+class Duel:
+    """A duel. rows: label → profile; published: label → scenario → end effector [mm], platform
+    [mm], heading [deg]; delays [ms]: of the setpoints, growing, each tried in the hover."""
+
+    vehicle: VehicleDescription
+    plant: tuple[str, ...]
+    scenarios: tuple[str, ...]
+    hover: str
+    seeds: int
+    delays: tuple[float, ...]
+    rows: dict[str, Profile]
+    published: dict[str, dict[str, tuple[float, float, float]]]
+
+
+@dataclass(frozen=True)
+class DuelResult:
+    """One flight: RMS errors with ramps, NaN for a hover or an early end: end effector, platform
+    [m], heading [deg], worst joint [deg]; standing [m]: mean offset of the end effector in hover;
+    outcome: one of `outcome.OUTCOMES`."""
+
+    row: str
+    scenario: str
+    seed: int
+    delay: float
+    hand: float
+    platform: float
+    heading: float
+    joint: float
+    standing: float
+    outcome: str
+
+    @property
+    def done(self) -> bool:
+        """Whether the mission was completed."""
+        return self.outcome == COMPLETED
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle fell or was out of control."""
+        return self.outcome == LOST
+
+
+ROWS = Rows(DuelResult)
+
+
+def load_duel(name_or_file: str, labels: Sequence[str] = ()) -> Duel:
+    """Read a duel of config/duel, or a file; labels: of the rows that fly, () for all.
+
+    Raises ConfigurationError for a file that is not valid, ProfileError, ScenarioError.
+    """
+    file = configuration.named("duel", name_or_file, suffixes=(".yaml",))
+    top = read_section(file, configuration.ConfigurationError)
+    top.only(("vehicle", "plant", "scenarios", "hover", "seeds", "delays_ms", "rows", "published"))
+    vehicle, given, published = load_description(top.text("vehicle")), top.section("rows"), {}
+    for label in labels:
+        if label not in given.values:
+            raise given.error(label, f"no such row; there are: {', '.join(given.values)}")
+    scenarios = top.texts("scenarios")
+    of = top.section("published")
+    for label in of.values:
+        cells = of.section(label)
+        cells.only(scenarios)
+        published[label] = {name: cells.numbers(name, 3) for name in cells.values}
+    for scenario in (*scenarios, top.text("hover")):
+        load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
+    delays = top.entry("delays_ms")
+    return Duel(
+        vehicle,
+        top.texts("plant"),
+        scenarios,
+        top.text("hover"),
+        top.whole("seeds"),
+        tuple(map(float, delays)),
+        {label: _profile(given.section(label), vehicle) for label in labels or given.values},
+        published,
+    )
+
+
+def _profile(entry: Section, vehicle: VehicleDescription) -> Profile:
+    """Return the profile of a row: that of the law, then the files."""
+    entry.only(("law", "profiles"))
+    law = entry.one_of("law", catalogue.LAWS, default=catalogue.DEFAULT)
+    base, files = default_profile(law, vehicle), entry.texts("profiles", default=())
+    return load_profile(*files, vehicle=vehicle, onto=base.sections) if files else base
+
+
+def trials(duel: Duel, seeds: int) -> Iterator[Trial]:
+    """Yield every scenario and the hover with its seeds, then the hover with its delays."""
+    for label, made in duel.rows.items():
+        for scenario in (*duel.scenarios, duel.hover):
+            yield from (_trial(duel, label, made, scenario, n) for n in range(1, seeds + 1))
+        yield from (_trial(duel, label, made, duel.hover, 1, delay) for delay in duel.delays)
+
+
+def _trial(
+    duel: Duel, label: str, made: Profile, scenario: str, seed: int, delay: float = 0.0
+) -> Trial:
+    found = [timed(parse_spec(text), {}, "delay") for text in late(1e-3 * delay, 0.0, 0.0, 0.0)]
+    effects = presets.added({}, presets.read(duel.plant))
+    return Trial(
+        *(label, made, 0.0, seed, scenario, effects),
+        faults=Schedule(tuple(found), seed),
+        drawn={"delay": delay},
+    )
+
+
+def measure(trial: Trial) -> DuelResult:
+    """Fly; return the result. Raises TrialFailed as `trial.recorded`."""
+    outcome = recorded(trial)
+    figures = figures_of(trial, outcome, outcome.abort_reason)
+    ended, nothing = classify(outcome.series, figures), float("nan")
+    whole = figures["trajectory_with_ramps"] if ended == COMPLETED else None
+    rms = whole["rms"] if whole else {}
+    return DuelResult(
+        *(trial.label, Path(trial.scenario).stem, trial.seed, trial.drawn["delay"]),
+        *(rms.get(name, nothing) for name in ("end_effector_norm_m", "epsilon_m")),
+        rms.get("end_effector_heading_deg", nothing),
+        max(rms["arm_deg"]) if rms else nothing,
+        nothing if whole or ended != COMPLETED else standing(outcome.series),
+        ended,
+    )
+
+
+def standing(series: Series) -> float:
+    """Return the distance [m] of the mean of the end effector's error from zero, in the second half
+    of the longest phase."""
+    spans = {name: series.flown & series.in_phase(name) for name, _, _ in series.phase_spans()}
+    rows = np.flatnonzero(max(spans.values(), key=np.sum))
+    rows = rows[round(SETTLED * len(rows)) :]
+    error = series.block("end_effector_error.")[rows, :3]
+    return float(np.linalg.norm(np.nanmean(error, axis=0)))
