@@ -23,7 +23,7 @@ from uam_control.control.output_limits import (
 )
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays
 from uam_control.maths.compiled import jit
@@ -67,7 +67,7 @@ PREDICTION = "measured ahead prediction nominal"
 
 class AttitudeArrays(NamedTuple):
     """Of the `AttitudeController`. load, turn (3,) [rad/s^2]: its moment per inertia (3,)
-    [kg m^2]; washout, slow (3,): see `wash_out`; turning: whether there are desired body rates;
+    [kg m^2]; washout, slow (3,): see `wash_out`; rates: number in RATE_REFERENCES;
     measured: whether the load is that of the measured angles; prediction (1,): see PREDICTION, and
     whether the delay counts."""
 
@@ -77,7 +77,7 @@ class AttitudeArrays(NamedTuple):
     inertia: np.ndarray
     washout: np.ndarray
     slow: np.ndarray
-    turning: bool
+    rates: int
     measured: bool
     torque_max: np.ndarray
     prediction: np.ndarray
@@ -125,9 +125,11 @@ def begin_attitude(
 ) -> None:
     """Write the errors of the attitude law: tracking errors, arm's moment, prediction."""
     begin_law(a.all, state, reference, attitude_reference, True)
-    if not a.turning:
+    if a.rates > 0:
+        planned = 1.0 if a.rates == 1 else 0.0
         for i in range(ROLL, ALPHA):
-            a.all.errors[E_DOT, i], a.all.errors[FEEDFORWARD, i] = state[CHI_DOT, i], 0.0
+            a.all.errors[E_DOT, i] = state[CHI_DOT, i] - planned * reference[CHI_DOT, i]
+            a.all.errors[FEEDFORWARD, i] = planned * reference[CHI_DDOT, i]
     if a.load.on:
         # the law's own inertia, that of vehicle and arm, has the angular acceleration already
         motion = reference

@@ -28,6 +28,7 @@ from uam_control.control.around_law import (
 )
 from uam_control.control.output_limits import (
     HEADING,
+    RATE_REFERENCES,
     REFERENCE,
     STATE,
     ArmLimits,
@@ -227,8 +228,8 @@ class AttitudeController(Controller):
         self.measured(now["measured"].item())
         arrays = AttitudeArrays(
             *(of_all, p.load(), np.zeros(3), np.array(p.inertia, dtype=float)),
-            *(np.array(p.feedforward_washout, dtype=float), self._slow, bool(p.rate_reference)),
-            p.load_from == STATE,
+            *(np.array(p.feedforward_washout, dtype=float), self._slow),
+            *(RATE_REFERENCES.index(p.rate_reference), p.load_from == STATE),
             *(np.array(p.torque_max, dtype=float), now),
         )
         rows = self._errors

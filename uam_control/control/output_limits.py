@@ -30,6 +30,7 @@ RESERVE = 0.2  # of thrust_max, for the horizontal force if the vertical one tak
 LONGEST_PREDICTION = 0.1  # [s]
 WORLD, HEADING = "world", "heading"  # frames of the position's theta_hat
 REFERENCE, STATE = "reference", "state"
+RATE_REFERENCES = "desired", "planned", "none"
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,10 @@ class AttitudeLimits(TorqueLimits, ArmLoadParameters):
         "stabilises the hand",
         (REFERENCE, STATE),
     )
-    rate_reference: bool = switch(
-        True, "false: e_dot is Omega alone, without desired body rates and accelerations"
+    rate_reference: str = choice(
+        RATE_REFERENCES[0],
+        "desired body rates: of the desired attitude, those planned for the trajectory, or none",
+        RATE_REFERENCES,
     )
     feedforward_washout: tuple = vector(
         (0.0, 0.0, 0.0),
