@@ -7,7 +7,7 @@ from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.experiments.compare import comparison_report, modularity, plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
-from uam_lab.experiments.compare.plan import ASMC1, ASMC2, FROZEN, PROPOSED
+from uam_lab.experiments.compare.plan import ASMC1, ASMC2, FROZEN, PROPOSED, entries
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 
 
@@ -109,3 +109,10 @@ def test_the_tables_have_our_figures_the_papers_and_the_degradation():
         position
     )
     assert "RMS attitude error [deg]" in attitude and "alpha_2" in arm
+
+
+def test_a_row_freezes_one_subsystem_or_all():
+    arm, every = entries(("frozen_arm", "frozen"))
+    nodes = ("position_controller", "attitude_controller", "arm_controller")
+    assert [arm.profile.sets[node].adapt for node in nodes] == [True, True, False]
+    assert [every.profile.sets[node].adapt for node in nodes] == [False] * 3

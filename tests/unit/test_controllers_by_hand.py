@@ -185,6 +185,32 @@ def test_the_form_of_the_rate_error_follows_the_parameters():
     )
 
 
+@pytest.mark.parametrize(
+    ("rates", "expected"),
+    # tau = 2 (chi_d_ddot - 3 e_dot) of roll, e_dot = 1 - desired rate
+    [("desired", 2.0 * (8.0 - 3.0 * -3.0)), ("planned", 2.0 * (0.5 - 3.0 * -1.0)), ("none", -6.0)],
+)
+def test_desired_body_rates_are_those_that_the_parameter_names(rates, expected):
+    controller, (state, reference, desired) = (
+        torque(AttitudeController, 3, rate_reference=rates),
+        vehicle(),
+    )
+    state[1, 3], reference[1:, 3], desired[1:, 0] = 1.0, (2.0, 0.5), (4.0, 8.0)
+    tau = controller.update(state, reference, desired, True, 0.1)
+    np.testing.assert_allclose(tau, [expected, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("source", "angle"), [("reference", 0.0), ("state", A)])
+def test_the_arm_s_moment_is_that_of_the_angles_that_the_parameter_names(source, angle):
+    arm = planar_arm([0.5, 0.0], [0.2, 0.1], [0.4, 0.2]) | {"arm_gravity": 10.0}
+    given = {"arm_feedforward": True, "load_from": source, **arm}
+    controller, (state, reference, desired) = torque(AttitudeController, 3, **given), vehicle()
+    state[0, 6] = A
+    tau = controller.update(state, reference, desired, True, 0.004)
+    # 0.5 kg at 0.2 m, turned forward by A: the rotors hold up 0.5 10 0.2 sin(A) N m, about -y
+    np.testing.assert_allclose(tau, [0.0, -1.0 * math.sin(angle), 0.0], atol=1e-12)
+
+
 def test_another_corner_of_the_attitude_filter_from_the_next_tick_on():
     slow, fast = position(), position()
     fast.set_parameters(replace(fast.parameters, attitude_cutoff=50.0))

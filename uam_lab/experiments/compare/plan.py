@@ -5,11 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import (
-    CONTROLLERS,
     Profile,
     default_profile,
     load_profile,
@@ -17,6 +17,7 @@ from uam_control.profiles.profile import (
 )
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.trial import Trial
+from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 
@@ -36,6 +37,7 @@ ROWS = {
     **{name: law.label for name, law in catalogue.LAWS.items() if name != catalogue.DEFAULT},
     "proposed": PROPOSED,
     "frozen": FROZEN,
+    **{f"frozen_{name}": f"proposed, {name} frozen" for name in SUBSYSTEMS},
     "table1": VERBATIM,
     "table1_weight": WITH_WEIGHT,
     "table1_flown": FLOWN,
@@ -79,6 +81,7 @@ def entries(
     variants = {
         "proposed": lambda: proposed,
         "frozen": lambda: frozen(proposed),
+        **{f"frozen_{name}": partial(frozen, proposed, (name,)) for name in SUBSYSTEMS},
         "table1": lambda: load_profile(TABLE1, vehicle=vehicle),
         "table1_flown": lambda: load_profile(TABLE1_FLOWN, vehicle=vehicle),
         "px4_position": lambda: load_profile(str(proposed.file), PX4_PROFILE, vehicle=vehicle),
@@ -92,11 +95,12 @@ def entries(
     )
 
 
-def frozen(profile: Profile) -> Profile:
-    """Return the profile with constant gains: the adapted gains keep their initial values."""
+def frozen(profile: Profile, subsystems: Sequence[str] = SUBSYSTEMS) -> Profile:
+    """Return the profile with constant gains: the adapted gains of these `subsystems` keep their
+    initial values, theta_hat is zero."""
     sections = copy.deepcopy(profile.sections)
-    for node in CONTROLLERS:
-        sections[node]["adapt"] = False
+    for name in subsystems:
+        sections[f"{name}_controller"]["adapt"] = False
     return profile_of(sections, Path(f"{profile.name}_frozen.yaml"), profile.vehicle)
 
 

@@ -1,0 +1,99 @@
+"""`uam duel`: its file, its tables, and the published gains in its profiles."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from uam_control.profiles.profile import load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import load_description
+from uam_lab.experiments.duel import report
+from uam_lab.experiments.duel.flights import DuelResult, load_duel, standing, trials
+
+NAN = math.nan
+PROFILES = configuration.path("profiles/fsc_geo_l1.yaml").parent
+
+
+def result(scenario="a", seed=1, delay=0.0, hand=NAN, standing=NAN, outcome="completed"):
+    return DuelResult("law", scenario, seed, delay, hand, 2 * hand, 0.5, 1.5, standing, outcome)
+
+
+def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure():
+    flown = [result(hand=0.010), result(seed=2, hand=0.014), result(seed=3, outcome="lost")]
+    flown += [result("hover", standing=0.002), result("hover", delay=20.0)]
+    flown += [result("hover", delay=40.0, outcome="lost"), result("hover", delay=60.0)]
+    duel = SimpleNamespace(
+        rows=["law"], scenarios=["a"], published={"law": {"a": (11.0, 9.0, 1.0)}}
+    )
+    text = report.text(duel, flown)
+    assert "| law | 12.0 (11) |" in text and "| law | 24.0 (9) |" in text
+    # worst joint, offset 2 mm, 20 ms survived as 40 was not, 1 of 4 flights ended early, lost
+    assert "| law | 1.50 | 2.0 | 20 | 1 of 4 | 1 |" in text
+
+
+@pytest.mark.parametrize(("ends", "said"), [("cc", "40 or more"), ("lc", "0"), ("", "")])
+def test_a_delay_is_survived_up_to_the_first_that_is_not(ends, said):
+    outcomes = {"c": "completed", "l": "lost"}
+    flown = [result(delay=20.0 * (i + 1), outcome=outcomes[e]) for i, e in enumerate(ends)]
+    assert report.survived(flown, "law") == said
+
+
+def test_standing_is_the_mean_error_in_the_second_half_of_the_longest_phase():
+    phase = np.array(["up"] * 2 + ["hover"] * 4)
+    error = np.array([9.0, 9.0, 9.0, 9.0, 1.0, 3.0])
+    series = SimpleNamespace(
+        flown=np.ones(6, dtype=bool),
+        phase_spans=lambda: [("up", 0, 2), ("hover", 2, 6)],
+        in_phase=lambda name: phase == name,
+        block=lambda name: np.outer(error, [0.6, 0.0, 0.8, 5.0]),
+    )
+    assert standing(series) == pytest.approx(2.0)
+
+
+def test_the_shipped_duel_flies_every_row_in_every_task():
+    duel = load_duel("t650", ("default", "MAC"))
+    planned = list(trials(duel, 2))
+    assert len(planned) == 2 * (7 * 2 + len(duel.delays))
+    assert {one.label for one in planned} == {"default", "MAC"}
+    assert all(one.vehicle_changes for one in planned)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"rows": {"a": {"law": "pid"}}}, "pid"),
+        ({"published": {"MAC": {"ee_circle_099": [1, 2, 3]}}}, "ee_circle_099"),
+        ({"published": {"MAC": {"ee_circle_010": [1, 2]}}}, "ee_circle_010"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
+    document = yaml.safe_load(configuration.path("duel/t650.yaml").read_text())
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(document | change))
+    with pytest.raises(ConfigurationError, match=said) as found:
+        load_duel(str(file))
+    assert "\n" not in str(found.value)
+
+
+def test_an_unknown_row_is_refused():
+    with pytest.raises(ConfigurationError, match="no such row"):
+        load_duel("t650", ("nobody",))
+
+
+def test_geometric_l1_has_the_published_stiffness_and_damping():
+    vehicle = load_description("t650")
+    sections = yaml.safe_load((PROFILES / "fsc_geo_l1.yaml").read_text())
+    for node, stiffness, damping in (
+        ("position_controller", [20.11, 20.11, 13.5], [11.05, 11.05, 10.82]),
+        ("attitude_controller", [3.337, 3.337, 1.737], [0.9505, 0.9505, 0.4105]),
+        ("arm_controller", [3.0] * 4, [0.25] * 4),
+    ):
+        one = sections[node]["ros__parameters"]
+        inertia = np.array(one["inertia"])
+        np.testing.assert_allclose(inertia * one["lambda_1"], stiffness, rtol=1e-3)
+        np.testing.assert_allclose(inertia * one["lambda_2"], damping, rtol=1e-3)
+    assert load_profile("t650", "fsc_mac", vehicle=vehicle).bridge()["setpoint"] == "wrench"
