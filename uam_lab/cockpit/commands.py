@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from std_srvs.srv import SetBool, Trigger
 
@@ -153,6 +154,11 @@ class Commands:
             self._said(False, f"Go to: {error}")
             return
         self._services.publish(topics.GOAL_POSE, goal)
+
+    def bring_hand(self, place: np.ndarray) -> None:
+        """Send a goal of the hand, place (3,) [m]; its heading stays."""
+        goal = goal_of(" ".join(map(repr, place.tolist())))
+        self._services.publish(topics.END_EFFECTOR_GOAL, goal)
 
 
 def goal_of(text: str) -> PoseStamped:

@@ -20,6 +20,7 @@ from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.checklist_panel import ChecklistPanel
 from uam_lab.cockpit.commands import Commands
 from uam_lab.cockpit.gains import NodeGains
+from uam_lab.cockpit.hand_marker import HandMarker
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.plain_page import PlainPage
 from uam_lab.cockpit.remote_parameters import RemoteParameters
@@ -87,10 +88,12 @@ class Page:
         with gui.add_folder("Commands"):
             self._commands = Commands(self._services, self._health, self.say)
             self._buttons = CommandButtons(gui, self._commands, self._todo.put)
+        self._hand = HandMarker(server, self._view, self._commands, vehicle, self._todo.put)
         self._checklist = ChecklistPanel(gui, self._services, self._todo.put, self.say)
         self._follow = gui.add_checkbox("Camera follows the vehicle", False)
         self._answers = gui.add_html("")
         self._followed = np.zeros(3)
+        self._mission_values: dict[str, Any] = {}
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_WIDTH)
         self._panel = gui.add_panel()
@@ -121,11 +124,13 @@ class Page:
         if now >= self._due["charts"]:
             self._due["charts"] = now + self._options["chart_period"]
             self._charts.draw()
+            self._hand.look()
             self._update_headline()
         if now >= self._due["nodes"]:
             self._due["nodes"] = now + RETRY
             if self._health.mission is not None:
-                self._services.offer(topics.GOAL_POSE)
+                for topic in (topics.GOAL_POSE, topics.END_EFFECTOR_GOAL):
+                    self._services.offer(topic)
             self._find_nodes()
 
     def end(self) -> bool:
@@ -207,6 +212,8 @@ class Page:
     def _know(self, node: str, values: dict[str, Any]) -> None:
         """Take the limits that the headline shows from the parameters of a node."""
         if node == "mission":
+            self._mission_values |= values
+            self._hand.reach.know(self._mission_values)
             health = self._health
             known = zip(("delay_warn", "delay_land"), health.delay_shares, strict=True)
             health.delay_shares = tuple(float(values.get(name, old)) for name, old in known)

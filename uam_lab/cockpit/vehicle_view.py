@@ -10,6 +10,7 @@ import viser
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from uam_control.maths.rotations import matrix_from_quaternion
 from uam_lab.cockpit.urdf_shapes import Shape, shapes
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.topics import WORLD
@@ -31,6 +32,7 @@ class VehicleView:
         self._scene = scene
         self._paths: dict[str, str] = {WORLD: f"/{WORLD}"}
         self._frames: dict[str, viser.FrameHandle] = {}
+        self._parents: dict[str, str] = {}  # of the frames
         self._orphans: dict[str, Transform] = {}  # by child: the newest whose parent is unknown
         self._shapes: dict[str, list[Shape]] = {}
         self._markers: dict[str, Any] = {}
@@ -69,6 +71,15 @@ class VehicleView:
             for child in placed:
                 self._place(child, self._orphans.pop(child))
 
+    def place(self, frame: str) -> np.ndarray | None:
+        """Return the place (3,) [m, world] of a frame, None for one that is not shown."""
+        found = np.zeros(3) if frame in self._frames else None
+        while frame in self._frames:
+            step = self._frames[frame]
+            found = matrix_from_quaternion(np.array(step.wxyz)) @ found + step.position
+            frame = self._parents[frame]
+        return found
+
     def _own(self, frame: str) -> str:
         """Return a frame's name without the vehicle's prefix."""
         return frame.removeprefix(self._prefix)
@@ -81,6 +92,7 @@ class VehicleView:
             if len(self._frames) >= MOST_FRAMES:
                 raise BadMessage(f"frame {child}: {MOST_FRAMES} frames are shown already")
             path = self._paths[child] = f"{self._paths[transform.parent]}/{child}"
+            self._parents[child] = transform.parent
             self._frames[child] = self._scene.add_frame(
                 path, show_axes=child == REFERENCE, axes_length=AXES, axes_radius=AXES / 24.0
             )
