@@ -34,7 +34,7 @@ VEHICLES = ("s500_arm", "s500_arm3", "t650")
 GOALS = 200
 REACH, SETTLE = 0.5, 2.5  # [m], [s]
 NEAR, TURNED = 0.005, math.radians(1.0)
-STILL = 0.01  # [m/s] of a hand that has stopped
+EVERY, STOPPED = 0.05, (0.3, 0.5, 1.0)  # [s] from twist to twist; after the last one
 
 
 class Hovering:
@@ -156,25 +156,22 @@ def goals(name: str, count: int) -> None:
 
 
 def jog(name: str) -> None:
-    """Print how long the true hand moves after the last of the twists."""
+    """Print the speed of the true hand after the last of the twists, along each axis."""
     flight = Hovering(name)
-    speed = flight.limits.jog_speed
     for axis in np.eye(3):
-        for _ in range(40):
-            flight.ask(HandTwist(flight.flyer, speed * axis, np.zeros(3)))
-            flight.run(0.05)
-        before, stopped, speeds = flight.hand, 0.0, []
-        for _ in range(round(1.5 / flight.period)):
-            flight.run(flight.period)
-            now = flight.hand
-            speeds.append(float(np.linalg.norm((now - before)[POSITION])) / flight.period)
-            before = now
-        for part in np.nonzero(np.array(speeds) > STILL)[0][-1:]:
-            stopped = (part + 1) * flight.period + 0.05
-        at = speeds[round(0.25 / flight.period)]
-        print(f"{name}, {axis}: {1e3 * at:.0f} mm/s 0.3 s after the last twist; below "
-              f"{1e3 * STILL:.0f} mm/s from {stopped:.2f} s on")  # fmt: skip
-        flight.run(1.0)
+        for _ in range(round(2.0 / EVERY)):
+            flight.ask(HandTwist(flight.flyer, flight.limits.jog_speed * axis, np.zeros(3)))
+            flight.run(EVERY)
+        speeds, now = [], EVERY
+        for until in STOPPED:
+            flight.run(until - now)
+            before, now = flight.hand, until + 5.0 * flight.period
+            flight.run(now - until)
+            moved = np.linalg.norm((flight.hand - before)[POSITION])
+            speeds.append(f"{1e3 * moved / (now - until):.0f}")
+        after = ", ".join(f"{one:g}" for one in STOPPED)
+        print(f"{name}, {'xyz'[axis.argmax()]}: {', '.join(speeds)} mm/s {after} s after the last")
+        flight.run(2.0)
 
 
 def main() -> None:

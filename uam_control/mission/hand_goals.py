@@ -35,6 +35,8 @@ from uam_control.mission.plans import (
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
+# of the way at full speed, in which a jog stops: the quintic of 0.4 ends without jerk, so gently
+SHARE = 0.4
 ROUNDS = 3  # of the base's tilt, which follows from its own motion
 PLACE = slice(0, HEADING + 1)  # of TOOL: x y z heading
 
@@ -187,7 +189,7 @@ class Jog(Goal):
         blend = Blend(start.copy(), max(stop, RAMP * float(max(bends))))
         begin = start[CHI] + change * blend.length / 2 + start[CHI_DDOT] * blend.length**2 / 12
         points = np.zeros((CHI_DDOT + 1, 3, len(rates)))
-        points[CHI] = begin + np.outer([0.0, hold, hold + stop / 2], rates)
+        points[CHI] = begin + np.outer([0.0, hold, hold + SHARE * stop], rates)
         points[CHI_DOT, :2] = rates
         return Plan(stamp, np.array([0.0, hold, hold + stop]), points, blend, self)
 

@@ -66,7 +66,7 @@ class HandLimits(ParameterSet):
     jog_hold: float = number(
         0.05, "age of a jog's message from which on it slows down", "s", 0.01, 1.0
     )
-    jog_stop: float = number(0.44, "time in which it then stops", "s", 0.05, 2.0)
+    jog_stop: float = number(0.4, "time in which it then stops", "s", 0.05, 2.0)
 
 
 @dataclass(frozen=True)
