@@ -146,6 +146,8 @@ def test_another_goal_of_the_base_replaces_the_hand_and_keeps_the_arm():
         (pose("s500_arm", 0.0, 0.0, 1.0, 0.0, 0.4, 0.0), "the arm leaves the tool 23 deg from its"),
         (pose("s500_arm", 0.0, 0.0, 1.0, 0.0, 0.0, 1.5), "singular: the tool's y axis leans by 86"),
         (twist("s500_arm", (0.1, FREE, 0.0)), "a velocity is not finite"),
+        (twist("s500_arm", (0.0, 3.0, 4.0)), "too fast: 5 m/s, 1 m/s allowed"),
+        (twist("s500_arm", (1e308, 0.0, 1e308)), "too fast: 1.41e+308 m/s"),
         (twist("s500_arm", (0.0, 0.0, 0.0), (0.0, 0.2, 0.0)), "the arm cannot turn the tool so"),
     ],
 )  # fmt: skip
@@ -232,7 +234,7 @@ def test_a_jog_moves_the_hand_and_ends_when_the_messages_do(name):
 def test_a_jog_is_slowed_down_to_its_limits_and_one_transition():
     flight = hovering()
     before = len(flight.mission.changes)
-    jogged(flight, twist("s500_arm", (3.0, 4.0, 0.0)), 1.0)
+    jogged(flight, twist("s500_arm", (0.3, 0.4, 0.0)), 1.0)
     np.testing.assert_allclose(flight.state[CHI_DOT, :3], [0.06, 0.08, 0.0], atol=1e-3)
     assert [one.event for one in flight.mission.changes[before:]] == [Event.GOAL]
 
@@ -253,7 +255,7 @@ def test_a_jog_ends_at_the_limits_of_the_base():
         accepted, text = flight.mission.plan(goal)
         answers.add(accepted)
         flight.step(5)
-        assert flight.state[CHI, 2] > 0.58 - 1e-9
+        assert flight.state[CHI, 2] > 0.58 - 1e-3  # it is flown a tick of 10 ms after its check
     assert answers == {True, False} and "z is" in text
     flight.assert_smooth()
 
@@ -264,3 +266,19 @@ def test_a_hold_ends_a_jog():
     assert flight.mission.request(OperatorCommand.HOLD)[0]
     flight.step(200)
     assert flight.mission.output.state is State.HOLDING and not flight.state[CHI_DOT].any()
+
+
+def test_a_jog_of_zeros_ends_a_jog_and_nothing_else():
+    flight, still = hovering(), twist("s500_arm", (0.0, 0.0, 0.0))
+    before = len(flight.mission.changes)
+    assert flight.mission.plan(still) == (True, "accepted: nothing to stop")
+    flight.step(10)
+    assert len(flight.mission.changes) == before and flight.mission.output.phase != "goal"
+    jogged(flight, twist("s500_arm", (0.1, 0.0, 0.0)), 1.0)
+    for _ in range(12):
+        assert flight.mission.plan(still)[0]
+        flight.step(5)
+    flight.step(30)
+    assert not flight.state[CHI_DOT].any()
+    assert flight.mission.plan(still) == (True, "accepted: nothing to stop")
+    flight.assert_smooth()

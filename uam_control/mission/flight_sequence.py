@@ -326,6 +326,9 @@ class FlightSequence:
         if refusal:
             return False, f"refused: {refusal}"
         parameters, motion = self._parameters, self._guidance.motion
+        moves = self._guidance.planned and not self._guidance.arrived(self._stamp)
+        if goal.still and not moves:
+            return True, "accepted: nothing to stop"
         made = self._guidance.on_way_to(goal, self._stamp)
         if made is None:
             try:

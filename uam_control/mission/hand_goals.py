@@ -37,6 +37,7 @@ TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
 # of the way at full speed, in which a jog stops: the quintic of 0.4 ends without jerk, so gently
 SHARE = 0.4
+MISTAKEN = 10.0  # times the limit of a jog, beyond which a velocity is in another unit
 ROUNDS = 3  # of the base's tilt, which follows from its own motion
 PLACE = slice(0, HEADING + 1)  # of TOOL: x y z heading
 
@@ -147,6 +148,15 @@ class HandTwist(Goal):
     of_tool: bool = False
     columns = BOTH
 
+    @property
+    def still(self) -> bool:
+        """See `Goal`."""
+        return not (self.linear.any() or self.angular.any())
+
+    def equals(self, other: HandTwist) -> bool:
+        """Return whether both only end a motion; any other twist goes on from where it is."""
+        return self.still and other.still
+
     def solved(self, reference: np.ndarray, p: MissionParameters, ground: float) -> Jog:
         """Return the velocities of base and arm; see `Goal.solved`."""
         given = np.stack([self.linear, self.angular])
@@ -154,8 +164,9 @@ class HandTwist(Goal):
             raise PlanRefused("a velocity is not finite")
         tool = tools(self.flyer.chain, reference[[CHI]])[0]
         linear, angular = given @ _axes(tool).T if self.of_tool else given
-        linear = _limited(linear, p.jog_speed)
-        rates = np.array([*linear, *_tool_rates(tool, _limited(angular, p.jog_turn_rate))])
+        linear = _limited(linear, p.jog_speed, "m/s")
+        angular = _limited(angular, p.jog_turn_rate, "rad/s")
+        rates = np.array([*linear, *_tool_rates(tool, angular)])
         lowest = tool[Z] + rates[Z] * (p.jog_hold + p.jog_stop)
         if rates[Z] < 0.0 and lowest < p.hand_floor:
             raise PlanRefused(_below(lowest, p))
@@ -167,7 +178,7 @@ class HandTwist(Goal):
             raise PlanRefused(
                 f"singular: a joint would turn at {worst:.2f} rad/s, allowed {p.plan_joint_rate:g}"
             )
-        return Jog(found)
+        return Jog(found, self)
 
 
 @dataclass(frozen=True)
@@ -175,6 +186,7 @@ class Jog(Goal):
     """Velocities of base and arm, rates (6 + n,), until the next message; without one, a stop."""
 
     rates: np.ndarray
+    asked: HandTwist
     columns = BOTH
 
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
@@ -191,7 +203,7 @@ class Jog(Goal):
         points = np.zeros((CHI_DDOT + 1, 3, len(rates)))
         points[CHI] = begin + np.outer([0.0, hold, hold + SHARE * stop], rates)
         points[CHI_DOT, :2] = rates
-        return Plan(stamp, np.array([0.0, hold, hold + stop]), points, blend, self)
+        return Plan(stamp, np.array([0.0, hold, hold + stop]), points, blend, self.asked)
 
 
 def _met(
@@ -242,9 +254,12 @@ def _differentiate(times: np.ndarray, rows: np.ndarray) -> None:
         rows[row, [0, -1]] = 0.0
 
 
-def _limited(velocity: np.ndarray, most: float) -> np.ndarray:
-    """Return a velocity (3,), slowed down to `most`."""
-    return velocity * (most / max(float(np.linalg.norm(velocity)), most))
+def _limited(velocity: np.ndarray, most: float, unit: str) -> np.ndarray:
+    """Return a velocity (3,), slowed down to `most`; raise PlanRefused for one in another unit."""
+    size = math.hypot(*velocity)
+    if size > MISTAKEN * most:
+        raise PlanRefused(f"too fast: {size:.3g} {unit}, {MISTAKEN * most:g} {unit} allowed")
+    return velocity * (most / max(size, most))
 
 
 def _axes(tool: np.ndarray) -> np.ndarray:
