@@ -61,8 +61,10 @@ def main() -> None:
                 done = fly(Trial(name, profile, 0.0, seed, scenario, vehicle_changes=changes))
                 series = done.series
                 flown = np.isfinite(series["reference.x"]) & np.isfinite(series["truth.x"])
-                true, own = (distance(series, one, flown) for one in ("truth", "state"))
-                arm = np.degrees([series[f"state.{j}"] - series[f"reference.{j}"] for j in joints])
+                true, own = (distance(series, one, flown) for one in ("truth", "estimate"))
+                arm = np.degrees(
+                    [series[f"estimate.{j}"] - series[f"reference.{j}"] for j in joints]
+                )
                 angle = float(np.sqrt(np.sum(np.square(arm[:, flown]), axis=0).mean()))
                 outcome = done.failure or done.abort_reason or "completed"
                 print(

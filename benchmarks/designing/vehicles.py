@@ -22,8 +22,11 @@ INERTIA = 0.16, 0.18, 0.24  # of the body, parts of mass radius^2
 SHOULDER, SHORT, FOOT = 0.3, 0.03, 0.012  # of the radius to joint 1, magnet below its pivot, foot
 STRONG = 4.0  # stall torque, parts of the torque that holds the arm level
 THRUST_TO_WEIGHT = 2.0
+PAYLOAD = 0.05  # of the mass
 AXES = {"x": "1 0 0", "y": "0 -1 0", "z": "0 0 1"}  # of a roll, pitch and yaw joint
-SCENARIO_NAMES = ("hover", "circle", "arm motions")
+PICK = "pick"
+SCENARIO_NAMES = ("hover", "circle", "arm motions", PICK)
+STAND, GRIP, SET_DOWN = 0.789, 0.767, 0.10  # [m] of config/environment.yaml; face above the mat
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ def write(made: Made, folder: Path) -> Path:
 
 
 def scenarios(made: Made, folder: Path) -> dict[str, Path]:
-    """Write what a vehicle flies: hover, a circle at 1 m/s, motions of each joint."""
+    """Write what a vehicle flies: hover, a circle at 1 m/s, motions of each joint, a pick."""
     ground = [
         {"coordinate": name, "from": 0, "until": 3, "to": height}
         for name, height in (("x", 0.0), ("y", 0.0), ("z", 1.2))
@@ -93,11 +96,37 @@ def scenarios(made: Made, folder: Path) -> dict[str, Path]:
             moves.append({"coordinate": name, "from": time, "until": time + 2.5, "to_deg": angle})
             time += 3.0
     arm = {"phases": phases, "moves": moves, "landing": {"at": time, "duration": 6}}
-    found = {}
-    for name, values in zip(SCENARIO_NAMES, (hover, {"trajectory": circle}, arm), strict=True):
+    found, flown = {}, (hover, {"trajectory": circle}, arm, _pick(made))
+    for name, values in zip(SCENARIO_NAMES, flown, strict=True):
         found[name] = folder / f"{made.name}_{name.replace(' ', '_')}.yaml"
         found[name].write_text(yaml.safe_dump({"description": f"{name}."} | values))
     return found
+
+
+def _pick(made: Made) -> dict[str, Any]:
+    """Return a pick with the arm straight down, which reaches below the feet."""
+    reach = round((SHOULDER + 1.0) * made.radius + SHORT, 4)
+    high = GRIP + reach + 0.25
+    moves = [
+        {"coordinate": name, "from": begin, "until": end, "to": to}
+        for name, begin, end, to in (
+            *(("x", 0, 3, 0.0), ("y", 0, 3, 0.0), ("z", 0, 3, high)),
+            *(("x", 3, 7, -STAND), ("z", 8, 11, GRIP + reach - 0.004), ("z", 12, 14, high)),
+            *(("x", 14, 19, STAND), ("z", 19, 23, SET_DOWN + reach), ("z", 24, 28, high)),
+            ("x", 28, 32, 0.0),
+        )
+    ]
+    for k, home in enumerate(_stowed(made), start=1):
+        for begin, to in (3, 0.0), (28, home):
+            name = f"alpha_{k}"
+            moves.append({"coordinate": name, "from": begin, "until": begin + 4, "to_deg": to})
+    return {
+        "phases": [{"from": 0, "name": "take-off"}, {"from": 3, "name": "motion"}],
+        "moves": moves,
+        "magnet": [{"at": 11.5, "energised": True}, {"at": 23.5, "energised": False}],
+        "payload": {"mass": PAYLOAD * made.mass, "drop_point": [STAND, 0.0]},
+        "landing": {"at": 33, "duration": 6},
+    }
 
 
 def _stowed(made: Made) -> list[float]:

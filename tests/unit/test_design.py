@@ -19,6 +19,7 @@ from uam_lab.experiments.design.criteria import DesignError, load_criteria
 from uam_lab.experiments.design.facts import Facts, inertias, largest_torque, noise_gains
 from uam_lab.experiments.design.rate_loop import rate_loop
 from uam_lab.experiments.margins.kept import missed
+from uam_lab.experiments.margins.margins import Margins
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.plant import Vehicle
 
@@ -171,6 +172,24 @@ def test_margins_that_no_gains_keep_are_refused(designed, tmp_path, capsys, monk
     asked = ["vehicle", "design", str(designed[0]), "--criteria", str(criteria)]
     assert main([*asked, "--out", str(tmp_path)]) == 2
     assert "no gains" in capsys.readouterr().err
+
+
+def test_a_joint_whose_link_falls_over_gets_faster_other_loops_slower():
+    """6 dB down are asked for; an upright link with 4 dB is 0.92 too slow, one with 3 dB up not."""
+    wanted = load_criteria().margins
+    good = Margins(20.0, 60.0, 12.0, math.inf, 0.1, 3.0, 1.3)
+    falls = replace(good, gain_down=4.0)
+    assert search.shortfall(good, wanted, joint=True) is None
+    assert search.shortfall(falls, wanted, joint=True).factor == pytest.approx(1.0 / 0.92)
+    assert search.shortfall(falls, wanted, joint=False).factor == 0.92
+    assert search.shortfall(replace(falls, gain=3.0), wanted, joint=True).factor == 0.92
+
+    made = search.Search(load_description(), load_criteria())
+    before = made.bandwidths()
+    made.mend({"alpha_1": search.Fault("falls", 1.0 / 0.92), "roll": search.Fault("late")})
+    after = made.bandwidths()
+    assert after.arm / before.arm == pytest.approx([1.0 / 0.92, 1.0])
+    assert after.attitude / before.attitude == pytest.approx([0.92, 0.92, 1.0])
 
 
 def test_a_real_vehicle_without_its_margins_does_not_start(tmp_path, capsys, monkeypatch):

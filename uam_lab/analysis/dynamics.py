@@ -81,7 +81,6 @@ class Body:
         model.opt.enableflags = 0  # no sleeping
         self.data = mujoco.MjData(model)
         self.data.qpos[model.joint(PAYLOAD).qposadr[0]] = 50.0
-        self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
     def place(self, chi: np.ndarray, swing: float = math.nan) -> None:
         """Set the pose: chi (6 + n,) [m, world; rad, Euler angles; rad, joints], pivot [rad].
@@ -110,6 +109,18 @@ class Body:
             moments.append(self.data.qfrc_bias[self.size])
         return math.atan2(-moments[0], moments[1])
 
+    def mass(self, chi: np.ndarray, swing: float = math.nan) -> np.ndarray:
+        """Return M of base, arm and pivot, (used, used), at rest at a pose; see `place`."""
+        self.place(chi, swing)
+        self.data.qvel[:] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+        used = self.size + self.pivot
+        whole, column = np.empty((used, used)), np.empty(self.model.nv)
+        for i, unit in enumerate(np.eye(self.model.nv)[:used]):
+            mujoco.mj_mulM(self.model, self.data, column, unit)
+            whole[:, i] = column[:used]
+        return whole
+
     def evaluate(
         self,
         chi: np.ndarray,
@@ -126,23 +137,15 @@ class Body:
         [rad], rate, acceleration of the pivot, see `place`. Units of the results: see `Dynamics`.
         """
         model, data, size = self.model, self.data, self.size
-        self.place(chi, swing[0])
-        data.qvel[:] = 0.0
-        mujoco.mj_forward(model, data)
-        gravity[:] = data.qfrc_bias[:size]
-        for i in range(size + self.pivot):
-            self._unit[i] = 1.0
-            mujoco.mj_mulM(model, data, self._column, self._unit)
-            self._unit[i] = 0.0
-            if i < size:
-                mass[:, i] = self._column[:size]
+        whole = self.mass(chi, swing[0])
+        mass[:], gravity[:] = whole[:size, :size], data.qfrc_bias[:size]
         data.qvel[:size] = chi_dot
         mujoco.mj_fwdVelocity(model, data)
         coriolis[:] = data.qfrc_bias[:size] - gravity
         if not self.pivot:
             pivot[:] = 0.0
             return
-        pivot[:] = self._column[:size] * swing[2] - data.qfrc_bias[:size]
+        pivot[:] = whole[:size, size] * swing[2] - data.qfrc_bias[:size]
         data.qvel[size] = swing[1]
         mujoco.mj_fwdVelocity(model, data)
         pivot += data.qfrc_bias[:size]

@@ -104,8 +104,7 @@ def inertia_at(body: Body, arm: tuple[float, ...]) -> np.ndarray:
     that of each joint with the base held (3 + n,) [kg m^2]; arm (n,) [rad]."""
     chi = np.zeros(body.size)
     chi[ARM] = arm
-    mass = np.zeros((body.size, body.size))
-    body.evaluate(chi, 0.0 * chi, np.array([math.nan, 0.0, 0.0]), mass, *np.zeros((3, body.size)))
+    mass = body.mass(chi)[: body.size, : body.size]
     across = mass[ATTITUDE, POSITION] @ np.linalg.solve(
         mass[POSITION, POSITION], mass[POSITION, ATTITUDE]
     )

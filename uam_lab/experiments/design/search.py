@@ -2,7 +2,8 @@
 
 Each loop has one bandwidth. It begins at what lags, noise and torques allow, and is made smaller
 by STEP until `uam margins`' model has the margins of the criteria at every pose of the arm and with
-the payload. All loops are judged together, because each closes around the others.
+the payload; that of a joint larger, where its gain may not fall enough: an upright link falls over.
+All loops are judged together, because each closes around the others.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -71,25 +72,32 @@ def design(
         except ProfileError:  # a gain below what a profile may have: slower does not help
             break
         progress(f"round {number}: {found.summary}")
-        if not found.slower:
+        if not found.faults:
             return search.result(found)
-        search.slow_down(found.slower)
+        search.mend(found.faults)
     raise DesignError(f"{described.name}: no gains within {number} rounds: {found.summary}")
+
+
+class Fault(NamedTuple):
+    """Why a loop's bandwidth must change, and by which factor."""
+
+    why: str
+    factor: float = STEP
 
 
 @dataclass(frozen=True)
 class Found:
-    """An evaluation: profile, vehicle, cases, and per loop that must be slower the reason."""
+    """An evaluation: profile, vehicle, cases, and the loops whose bandwidth must change."""
 
     described: VehicleDescription
     profile: Profile
     cases: tuple[Case, ...]
-    slower: dict[str, str]
+    faults: dict[str, Fault]
 
     @property
     def summary(self) -> str:
-        """Return the loops that must be slower, in one line."""
-        return "; ".join(f"{loop}: {why}" for loop, why in self.slower.items()) or "margins are met"
+        """Return the faults in one line."""
+        return "; ".join(f"{loop}: {f.why}" for loop, f in self.faults.items()) or "margins are met"
 
 
 class Search:
@@ -151,14 +159,14 @@ class Search:
         described = replace(self._described, autopilot_gains=gains)
         own = sections(described, self.facts, bandwidths, self._criteria)
         profile = profile_of(own, Path(f"{described.name}_profile.yaml"), described)
-        cases, slower = [], {}
+        cases, faults = [], {}
         for label, arm, mass in self._points():
             stack = stack_model(profile, Vehicle.of(described), mass, arm)
             analysis = analyse(stack)
             cases.append(Case(label, stack, analysis, {}, fastest_mode(stack)))
-            for loop, why in self._failing(stack, analysis).items():
-                slower.setdefault(loop, f"{why}, {label}")
-        return Found(described, profile, tuple(cases), slower)
+            for loop, fault in self._failing(stack, analysis).items():
+                faults.setdefault(loop, fault._replace(why=f"{fault.why}, {label}"))
+        return Found(described, profile, tuple(cases), faults)
 
     def _points(self) -> list[tuple[str, tuple[float, ...], float]]:
         """Return label, joint angles and payload [kg] of each operating point."""
@@ -166,33 +174,37 @@ class Search:
         loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
         return [*((name, arm, 0.0) for name, arm in poses.items()), loaded]
 
-    def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, str]:
-        """Return each loop that must be slower, with the reason."""
+    def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, Fault]:
+        """Return the fault of each loop that has one."""
         wanted, found = self._criteria.margins, {}
+        joints = stack.coordinates[YAW + 1 :]
         for loop, (_, margins) in analysis.loops.items():
-            if why := shortfall(margins, wanted):
-                found[loop] = why
+            if fault := shortfall(margins, wanted, loop in joints):
+                found[loop] = fault
         if analysis.setpoint_delay < wanted.delay:
             base = [name for name in analysis.loops if name in stack.coordinates[: YAW + 1]]
             worst = min(base, key=lambda name: analysis.loops[name][1].delay)
-            found.setdefault(worst, f"delay margin {1e3 * analysis.setpoint_delay:.0f} ms")
+            found.setdefault(worst, Fault(f"delay margin {1e3 * analysis.setpoint_delay:.0f} ms"))
         factor = 10.0 ** (wanted.gain / 20.0)
         if not found and analysis.stable:
             for name, one in (("up", factor), ("down", 1.0 / factor)):
                 if fastest_mode(scaled_motors(stack, one)).growth >= GROWTH:
-                    found[RATES] = f"gain margin of all motors {name}"
+                    found[RATES] = Fault(f"gain margin of all motors {name}")
         if not analysis.stable and not found:
-            found = dict.fromkeys(self._shares, "unstable")
+            found = dict.fromkeys(self._shares, Fault("unstable"))
         return found
 
-    def slow_down(self, loops: dict[str, str]) -> None:
-        """Make these loops slower by STEP; roll and pitch, and x and y, stay alike."""
+    def mend(self, faults: dict[str, Fault]) -> None:
+        """Change the bandwidths of these loops; roll and pitch, and x and y, stay alike."""
         names = self._described.coordinates
-        pairs = (names[ROLL], names[PITCH]), names[:Z]
-        for loop in {*loops, *(o for pair in pairs if {*pair} & {*loops} for o in pair)}:
-            self._shares[loop] *= STEP
-        for loop, why in loops.items():
-            self._limits[loop] = why
+        factors = {loop: fault.factor for loop, fault in faults.items()}
+        for pair in (names[ROLL], names[PITCH]), names[:Z]:
+            if {*pair} & {*faults}:
+                factors |= dict.fromkeys(pair, STEP)
+        for loop, factor in factors.items():
+            self._shares[loop] *= factor
+        for loop, fault in faults.items():
+            self._limits[loop] = fault.why
 
     def result(self, found: Found) -> Design:
         """Return the design; its profile has the delay margin of the cases."""
@@ -203,14 +215,16 @@ class Search:
         return Design(found.described, profile, dict(self._limits), found.cases)
 
 
-def shortfall(margins: Margins, wanted: SimpleNamespace) -> str:
-    """Return the margin of a loop that is below the wanted one, "" if all are met."""
+def shortfall(margins: Margins, wanted: SimpleNamespace, joint: bool) -> Fault | None:
+    """Return the margin of a loop that is below the wanted one; None: all are met."""
+    if joint and margins.gain_down < min(wanted.gain, margins.gain):
+        return Fault(f"gain margin down {margins.gain_down:.1f} dB", 1.0 / STEP)
     if margins.delay < wanted.delay:
-        return f"delay margin {1e3 * margins.delay:.0f} ms"
+        return Fault(f"delay margin {1e3 * margins.delay:.0f} ms")
     least = min(margins.gain, margins.gain_down)
     if least < wanted.gain:
-        return f"gain margin {least:.1f} dB"
-    return f"sensitivity {margins.peak:.2f}" if margins.peak > wanted.peak else ""
+        return Fault(f"gain margin {least:.1f} dB")
+    return Fault(f"sensitivity {margins.peak:.2f}") if margins.peak > wanted.peak else None
 
 
 def scaled_motors(stack: Stack, factor: float) -> Stack:
