@@ -49,7 +49,7 @@ def flown(name, autopilot_imu):
 
 
 @pytest.mark.parametrize(
-    "name", ["quick_pick", pytest.param("pick_and_place", marks=pytest.mark.long)]
+    "name", [pytest.param(one, marks=pytest.mark.long) for one in ("quick_pick", "pick_and_place")]
 )
 def test_the_mission_is_completed_with_jitter_as_with_the_companions_imu(name):
     _, nominal = flown(name, autopilot_imu=False)

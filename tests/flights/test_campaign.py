@@ -52,7 +52,11 @@ def test_what_failures_have_in_common_is_found():
 
 
 @pytest.mark.parametrize(
-    "scenario", ["hover", pytest.param("pick_and_place", marks=pytest.mark.slow)]
+    "scenario",
+    [
+        pytest.param("hover", marks=pytest.mark.long),
+        pytest.param("pick_and_place", marks=pytest.mark.slow),
+    ],
 )
 def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys, monkeypatch):
     mine, out = tmp_path / "mine.yaml", tmp_path / "out"

@@ -85,8 +85,8 @@ END = 100_000  # ticks: later than any end
         ({"scenario": "circle"}, 0.85),  # a CSV file: no moves
         ({"scenario": "quick_pick"}, 0.6),
         ({"scenario": "quick_pick", "seed": 3, "air": GUSTS}, 0.4),  # the clock stops, shifts
-        ({"scenario": "hover", "law": "asmc1"}, 0.75),
-        ({"scenario": "hover", "law": "asmc2"}, 0.75),
+        pytest.param({"scenario": "hover", "law": "asmc1"}, 0.75, marks=pytest.mark.long),
+        pytest.param({"scenario": "hover", "law": "asmc2"}, 0.75, marks=pytest.mark.long),
         ({"scenario": "hover", "vehicle": "hexa_arm"}, 0.75),
         ({"scenario": "arm3_motions", "vehicle": "s500_arm3"}, 0.75),
     ],

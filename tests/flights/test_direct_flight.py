@@ -126,6 +126,7 @@ def test_the_bridge_uses_its_section_of_the_profile():
     assert flight.sequence.parameters.stream_time == 2.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("profile", ["attitude_setpoints", "wrench_setpoints"])
 def test_other_setpoints_complete_the_mission(profile):
     """The autopilot's attitude loop flies in place of tau_q, or none of its loops."""

@@ -85,6 +85,7 @@ def test_a_firmware_of_ones_own_is_spoken(tmp_path):
     assert run("own_firmware.py", tmp_path / "flown").split()[-1] == "True"
 
 
+@pytest.mark.long
 def test_a_gain_is_swept(tmp_path):
     rows = run("sweep_gain.py", tmp_path).splitlines()[1:]
     assert len(rows) == 3 and all(row.endswith("True") for row in rows)

@@ -258,6 +258,7 @@ def test_the_same_seed_gives_the_same_flight_with_random_faults():
     assert first[2]["max"] != other[2]["max"]
 
 
+@pytest.mark.long
 def test_a_matrix_from_the_command_line(tmp_path, capsys):
     file = tmp_path / "small.yaml"
     file.write_text(

@@ -129,6 +129,7 @@ def test_it_flies_through_the_nodes(name, tmp_path):
     assert min(series[rotor].max() for rotor in rotors) > 1.0
 
 
+@pytest.mark.long
 def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
     command = ["campaign", "--vehicle", "s500_arm3", "--scenario", "hover", "--flights", "1"]
     command += ["--jobs", "1"]
@@ -153,6 +154,7 @@ def test_a_comparison_flies_the_joints_of_the_vehicle(tmp_path):
     assert "Vehicle s500_arm3, scenario hover" in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_a_fault_matrix_reaches_the_sixth_rotor(tmp_path, capsys):
     fault = {"fault": "motor_loss", "motor": 6, "remaining": 0.7}
     matrix = {"scenario": "hover", "moments": {"air": {"at": 5}}, "faults": [fault]}
@@ -167,6 +169,7 @@ def test_a_fault_matrix_reaches_the_sixth_rotor(tmp_path, capsys):
     assert [flight["outcome"] for flight in found["flights"]] == ["completed", "completed"]
 
 
+@pytest.mark.long
 def test_a_search_starts_from_the_profile_of_the_vehicle(tmp_path, capsys):
     space = {
         "controller": "modular",
