@@ -27,10 +27,13 @@ def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure
     flown += [result("hover", standing=0.002), result("hover", delay=20.0)]
     flown += [result("hover", delay=40.0, outcome="lost"), result("hover", delay=60.0)]
     duel = SimpleNamespace(
-        rows=["law"], scenarios=["a"], published={"law": {"a": (11.0, 9.0, 1.0)}}
+        rows=["law"],
+        scenarios=["a"],
+        published={"law": {"a": (11.0, 9.0, 1.0)}, "other": {"a": (5.0, 6.0, 7.0)}},
     )
     text = report.text(duel, flown)
     assert "| law | 12.0 (11) |" in text and "| law | 24.0 (9) |" in text
+    assert "| other | - (5) |" in text
     # worst joint, offset 2 mm, 20 ms survived as 40 was not, 1 of 4 flights ended early, lost
     assert "| law | 1.50 | 2.0 | 20 | 1 of 4 | 1 |" in text
 

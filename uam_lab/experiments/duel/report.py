@@ -30,10 +30,10 @@ def mean(values: Iterable[float]) -> float:
 
 
 def _errors(duel: Duel, results: Results, measure: int) -> str:
-    """Return rows × scenarios: flown (published) of a measure, over the completed flights."""
+    """Return rows × scenarios of a measure: mean of the completed flights (published figure)."""
     head, value, digits = MEASURES[measure]
     rows = []
-    for label in duel.rows:
+    for label in dict.fromkeys((*duel.published, *duel.rows)):
         cells = []
         for scenario in duel.scenarios:
             flown = mean(value(r) for r in _of(results, label, scenario))
