@@ -92,3 +92,17 @@ def test_a_reversed_joint_is_found_before_arming(tmp_path):
     status, said, out = rehearse(tmp_path, "--cable", "direction_reversed@start:joint=1")
     assert status == 1 and "start refused" in said
     assert json.loads((out / "logs/laboratory.json").read_text())["armed"] is False
+
+
+def test_a_box_is_carried_by_the_grippers_servo_on_the_bus(tmp_path):
+    arm = yaml.safe_load(template())["arm"]
+    arm["gripper"] = {"id": 3, "model": "xm430_w350", "direction": 1, "zero": 1200}
+    mocap = yaml.safe_load(template())["mocap"] | {"payload": "box"}
+    changes = {"vehicle": "s500_gripper", "scenario": "two_finger", "magnet": {"through": "servo"}}
+    status, said, out = rehearse(tmp_path, arm=arm, mocap=mocap, **changes)
+    if too_slow(said, out):
+        return
+    figures = json.loads((out / "metrics.json").read_text())
+    assert status == 0 and figures["grasp"]["state"] == "released", said
+    assert "fingers 40 mm open" in figures["grasp"]["decisions"][1]["text"]
+    assert figures["payload_place_error_m"] <= 0.03

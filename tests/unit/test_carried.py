@@ -36,6 +36,18 @@ def test_a_model_of_the_user_travels_with_the_files_that_it_includes(tmp_path, m
     assert arrived(found, profile).vehicle.model == there.model  # once in a process
 
 
+def test_a_gripper_of_the_user_travels_too(tmp_path):
+    own = tmp_path / "own"
+    shutil.copytree(configuration.root() / "grippers", own)
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"derives: s500_gripper\ngripper: {{type: {own / 'two_finger.yaml'}}}\n")
+    profile = replace(load_profile("s500"), vehicle=load_description(file))
+    found = carried("hover", profile)
+    shutil.rmtree(own)
+    there = Vehicle.of(arrived(found, profile).vehicle).compile(0.0)
+    assert there.joint("gripper_left").range == pytest.approx([0.01, 0.0375])
+
+
 def test_a_scenario_file_travels_as_it_was_read(tmp_path):
     file = Path(shutil.copy(configuration.root() / "scenarios/hover.yaml", tmp_path / "mine.yaml"))
     profile = load_profile("s500")

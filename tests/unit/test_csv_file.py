@@ -406,7 +406,7 @@ def test_a_trajectory_picks_and_drops(tmp_path, name):
     begin = scenario.trajectory_begins
     assert scenario.magnet == ((begin + 2.6, True), (begin + 9.2, False))
     (window,) = grasp_windows(scenario.motions, scenario.magnet)
-    assert window.dip == pytest.approx(0.06)
+    assert window.back == pytest.approx((0.0, 0.0, 0.06))
     times = np.array([window.descent, window.grip, window.lifted, window.release]) - begin
     assert times == pytest.approx([0.0, 2.6, 4.2, 9.2])
     assert window.departure - begin == pytest.approx(10.2)

@@ -27,7 +27,7 @@ def test_the_window_of_the_papers_mission():
     scenario = load_scenario("pick_and_place")
     (window,) = grasp_windows(scenario.moves, scenario.magnet)
     assert window[:5] == (30.0, 35.0, 37.5, 70.0, 71.0)
-    assert window.dip == pytest.approx(0.06)
+    assert window.back == pytest.approx((0.0, 0.0, 0.06))
 
 
 @pytest.mark.parametrize("name", ["hover", "arm_motions"])
@@ -117,14 +117,14 @@ def test_a_running_mean_has_the_mean_and_the_deviation_of_its_values():
 
 
 def test_a_fast_payload_is_compared_with_the_magnet_of_its_poses_stamp():
-    """At 5 m/s a pose that is 100 ms old lies 0.5 m behind the magnet."""
+    """At 5 m/s a pose that is 100 ms old lies 0.5 m behind the tool."""
     places, velocity = PlaceHistory(), np.array([5.0, 0.0, 0.0])
     for k in range(1000):  # the ring is written over
         places.add(STEP * k, PLACE + velocity * STEP * k)
     now, seen = STEP * 999, STEP * 999 - 0.107
     carried = PLACE + velocity * seen
-    sight = Sight(now, 50.0, PLACE + velocity * now, payload=carried, magnet_then=places.at(seen))
-    assert by_pose(sight, P).text == "payload 0 mm from the magnet"
+    sight = Sight(now, 50.0, PLACE + velocity * now, payload=carried, tool_then=places.at(seen))
+    assert by_pose(sight, P).text == "payload 0 mm from the tool"
     begin = PLACE + velocity * STEP * 900
     assert by_travel(sight, begin, begin, P).held
     sight.payload = PLACE  # it stayed where it was
@@ -148,7 +148,7 @@ def test_places_between_beside_and_outside_the_known_ones():
 def test_a_pose_of_an_unknown_place_has_no_verdict():
     sight = Sight(1.0, 50.0, PLACE, payload=PLACE + [0.5, 0.0, 0.0])
     assert by_pose(sight, P).held is False
-    sight.magnet_then = np.full(3, math.nan)
+    sight.tool_then = np.full(3, math.nan)
     assert by_pose(sight, P).held is None
     assert by_travel(sight, PLACE, PLACE, P).held is None
 
@@ -156,7 +156,7 @@ def test_a_pose_of_an_unknown_place_has_no_verdict():
 class Flight:
     """A vehicle that follows the mission's path exactly, and a payload on its stand.
 
-    grips(attempt) -> whether the magnet takes the payload; shift: of the payload on its stand.
+    grips(attempt) -> whether the tool takes the payload; shift: of the payload on its stand.
     """
 
     def __init__(
@@ -183,11 +183,11 @@ class Flight:
         self.error = np.zeros(3)
         self.gust = lambda time: 0.0  # [N]
 
-    def magnet(self):
+    def tool(self):
         return self.planned(self.time) + self.shift + self.error + self.noise()
 
     def planned(self, time):
-        """The magnet on the path of the scenario."""
+        """The tool on the path of the scenario."""
         motion = np.zeros((MOTION_ROWS, 8))
         self.path.write(time, motion)
         return hand_and_levers(ARM, motion[0])[0]
@@ -198,12 +198,12 @@ class Flight:
 
     def step(self):
         on = self.scenario.magnet_on(self.time) or self.executive.directive.grip
-        magnet = self.magnet()
-        near = np.linalg.norm(magnet - self.payload) < 0.01
+        tool = self.tool()
+        near = np.linalg.norm(tool - self.payload) < 0.01
         if on and not self.carried and near and self.grips(self.attempt()):
             self.carried = True
         if self.carried and on:
-            self.payload = magnet.copy()
+            self.payload = tool.copy()
         elif self.carried:
             self.carried, self.payload[2] = False, 0.05
         payload = self.payload if self.tracked else np.full(3, np.nan)
@@ -214,7 +214,7 @@ class Flight:
             Sight(
                 self.stamp,
                 self.time,
-                magnet,
+                tool,
                 error=self.error.copy(),
                 payload=payload.copy(),
                 lift=21.6 + load + self.gust(self.stamp),
@@ -246,7 +246,7 @@ def test_a_good_grasp_costs_no_time():
 def test_a_payload_beside_its_place_is_met():
     flight = Flight(lambda attempt: True, offset=(0.015, -0.01))
     assert flight.until(36.0)[-1] is Grasp.APPROACHED
-    assert np.hypot(*(flight.magnet() - flight.payload)[:2]) < 0.003
+    assert np.hypot(*(flight.tool() - flight.payload)[:2]) < 0.003
     assert flight.until()[-1] is Grasp.RELEASED
 
 

@@ -145,7 +145,10 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"mocap": "vrpn_mocap"}, "mocap: a mapping expected, got 'vrpn_mocap'"),
         ({"magnet": GRIPPER | {"magnet_output": 7}}, "magnet_output: 7 is outside 1 to 6"),
         ({"arm": {}}, "arm: a mapping expected"),
-        ({"magnet__through": "wifi"}, "magnet.through: 'wifi' is not one of gpio, autopilot, none"),
+        (
+            {"magnet__through": "wifi"},
+            "magnet.through: 'wifi' is not one of gpio, autopilot, servo, none",
+        ),
         ({"magnet": {"through": "none", "line": 3}}, "magnet.line: unknown; allowed: through"),
         ({"magnet": {"through": "autopilot"}}, "magnet.magnet: actuator or gripper expected"),
         ({"magnet__line": 2.5}, "magnet: line: 2.5 is no integer; allowed: 0 to 1023"),

@@ -77,7 +77,7 @@ def test_its_plants_stay_finite(preset):
 def test_a_scenario_with_a_magnet_is_refused(tmp_path):
     file, hover = tmp_path / "pick.yaml", configuration.named("scenarios", "hover").read_text()
     file.write_text(hover + "magnet:\n  - {at: 5, energised: true}\n")
-    with pytest.raises(ScenarioError, match="magnet: t650 has none"):
+    with pytest.raises(ScenarioError, match="magnet: t650 has no gripper"):
         load_scenario(str(file), DESCRIBED)
     assert load_scenario(str(file)).magnet
 

@@ -1,4 +1,4 @@
-"""Alignment of the magnet above the payload, before a descent.
+"""Alignment of the tool before its last way to the payload, mostly a descent.
 
 The correction contains the place of the payload and the mean attitude and joint errors, which no
 other part corrects. It leaves out the position error: the position law corrects it, and a second
@@ -14,6 +14,7 @@ import numpy as np
 
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import RunningMean, Sight
+from uam_control.grasp.windows import FROM_ABOVE, GraspWindow
 
 SPAN = 0.5  # [s] shortest time over which an alignment is judged
 PAUSE = 2.0  # [s] between two corrections
@@ -22,7 +23,9 @@ WORTH = 0.002  # [m] smallest correction
 
 
 class Alignment:
-    """Mean distance of the magnet from the payload, and the corrections of the path.
+    """Mean distance of the tool from the payload, and the corrections of the path.
+
+    Distances are across the approach and back along it, see `Approach.axes`: from above x, y, z.
 
     Without a tracked payload the distance is the position error: the payload is where the scenario
     has it. A tracked payload also gives the depth of the planned contact.
@@ -33,6 +36,7 @@ class Alignment:
         self._stamp = 0.0
         self._corrected: float | None = None  # stamp [s] of the last correction
         self._tracked = False
+        self._axes = FROM_ABOVE.axes
 
     def restart(self) -> None:
         """Forget all values."""
@@ -40,17 +44,19 @@ class Alignment:
         self._constant.restart()
         self._corrected = None
 
-    def add(self, sight: Sight, dip: float) -> None:
-        """Add a sight; dip [m]: height of the descent that follows."""
+    def add(self, sight: Sight, window: GraspWindow) -> None:
+        """Add a sight before the approach of a window."""
+        self._axes = window.approach.axes
         if sight.tracked != self._tracked:
             self.restart()
             self._tracked = sight.tracked
         self._stamp = sight.stamp
         if sight.tracked:
-            away = sight.magnet + sight.ahead - sight.payload - [0.0, 0.0, dip]
-            self._constant.add(sight.stamp, away - sight.error)
+            way = sight.tool + sight.ahead - sight.payload - window.back
+            away = self._axes @ way
+            self._constant.add(sight.stamp, self._axes @ (way - sight.error))
         else:
-            away = sight.error * [1.0, 1.0, 0.0]
+            away = self._axes @ sight.error * [1.0, 1.0, 0.0]
         self._distance.add(sight.stamp, away)
 
     @property
@@ -60,16 +66,16 @@ class Alignment:
 
     @property
     def distance(self) -> float:
-        """Mean horizontal distance [m]."""
+        """Mean distance across [m]."""
         return float(np.hypot(*self._distance.mean[:2]))
 
     @property
     def swing(self) -> float:
-        """Standard deviation [m] of the horizontal distance."""
+        """Standard deviation [m] of the distance across."""
         return float(np.hypot(*self._distance.deviation[:2]))
 
     def good(self, p: GraspParameters, factor: float = 1.0) -> bool:
-        """Return whether the descent may begin; factor: on the horizontal tolerances."""
+        """Return whether the approach may begin; factor: on the tolerances across."""
         if not self.known:
             return False
         z = self._constant.mean[2] if self._tracked else 0.0
@@ -85,7 +91,7 @@ class Alignment:
 
     def near(self, distance: float) -> bool:
         """Return whether the payload is within `distance` [m] of its place on the path, across and
-        in height; known."""
+        along the approach; known."""
         if not self.known:
             return False
         x, y, z = (self._constant if self._tracked else self._distance).mean.tolist()
@@ -107,4 +113,4 @@ class Alignment:
         if float(np.max(np.abs(away))) < worth:
             return shift
         self._corrected = self._stamp
-        return np.clip(shift - away, -p.align_range, p.align_range)
+        return np.clip(shift - self._axes.T @ away, -p.align_range, p.align_range)

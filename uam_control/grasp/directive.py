@@ -19,18 +19,18 @@ class Step(Enum):
     APPROACH = "before the descent"
     ALIGN = "waits above the payload"
     DESCEND = "descends"
-    LIFT = "magnet on, climbs"
+    LIFT = "grips, climbs"
     VERIFY = "waits for evidence"
     RETREAT = "back to the start of the descent"
     CLIMB = "leaves a contact upwards"
     CARRY = "carries"
-    RELEASE = "magnet off"
+    RELEASE = "lets go"
 
 
 @dataclass
 class Directive:
-    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: magnet on before the
-    scenario has it on; without_descent: the window whose descent is left out, None for none; land:
+    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: grip before the
+    scenario says so; without_descent: the window whose descent is left out, None for none; land:
     reason to land, "" for none."""
 
     pace: float = 1.0

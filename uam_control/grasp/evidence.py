@@ -1,4 +1,4 @@
-"""Evidence that the magnet holds the payload.
+"""Evidence that the tool holds the payload.
 
 The motion capture of the payload decides where it is available: it measures the fact itself, for
 any mass. Without it the mass decides, identified twice: from the vertical force of the position law
@@ -19,10 +19,10 @@ from uam_control.vehicle import GRAVITY
 
 LIFT_DEVIATION = 0.03  # [kg] of the mass from the force: vertical gusts during a lift
 TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
-SHARE = 0.5  # of the magnet's travel that the payload must follow
+SHARE = 0.5  # of the tool's travel that the payload must follow
 LEAST_TRAVEL = 0.02  # [m] on which that is based at least
 
-REACH = 0.003  # [m] height above the payload below which the magnet has contact
+REACH = 0.003  # [m] height above the payload below which the tool has contact
 
 
 class Evidence(NamedTuple):
@@ -45,39 +45,37 @@ def place(point: np.ndarray) -> str:
 
 
 def by_pose(sight: Sight, p: GraspParameters) -> Evidence:
-    """Return the evidence of the payload's distance from the magnet; it cannot tell held."""
+    """Return the evidence of the payload's distance from the tool; it cannot tell held."""
     if not sight.tracked:
         return Evidence(None, "payload not tracked")
-    apart = math.dist(sight.payload.tolist(), sight.magnet_then.tolist())
+    apart = math.dist(sight.payload.tolist(), sight.tool_then.tolist())
     if math.isnan(apart):
-        return Evidence(None, "payload's pose of an unknown place of the magnet")
+        return Evidence(None, "payload's pose of an unknown place of the tool")
     if apart > p.held_distance:
         return Evidence(False, f"{1e3 * apart:.0f} mm from the payload at {place(sight.payload)}")
-    return Evidence(None, f"payload {1e3 * apart:.0f} mm from the magnet")
+    return Evidence(None, f"payload {1e3 * apart:.0f} mm from the tool")
 
 
-def by_travel(
-    sight: Sight, magnet: np.ndarray, payload: np.ndarray, p: GraspParameters
-) -> Evidence:
-    """Return the evidence of the payload's pose: near the magnet, and moved with it.
+def by_travel(sight: Sight, tool: np.ndarray, payload: np.ndarray, p: GraspParameters) -> Evidence:
+    """Return the evidence of the payload's pose: near the tool, and moved with it.
 
-    magnet, payload (3,) [m]: `magnet_then` and grip point when the magnet came on. The direction
-    does not matter: an arm that turns meanwhile may lower the magnet as much as the vehicle climbs.
+    tool, payload (3,) [m]: `tool_then` and grip point at the grip. The direction does not matter:
+    an arm that turns meanwhile may lower the tool as much as the vehicle climbs.
     """
     near = by_pose(sight, p)
     if near.held is False or not sight.tracked:
         return near
-    travel, moved = sight.magnet_then - magnet, sight.payload - payload
+    travel, moved = sight.tool_then - tool, sight.payload - payload
     length = float(np.linalg.norm(travel))
     along = float(moved @ travel) / max(length, 1e-9)
     if math.isnan(along):
         return near
-    text = f"payload moved {1e3 * along:.0f} mm of the magnet's {1e3 * length:.0f} mm"
+    text = f"payload moved {1e3 * along:.0f} mm of the tool's {1e3 * length:.0f} mm"
     return Evidence(True if along >= SHARE * max(length, LEAST_TRAVEL) else None, text)
 
 
 def identified_mass(before: Load, now: Load, lever: float) -> float:
-    """Return the mass [kg] that the magnet carries, NaN if unknown; lever [m]: see `Sight`."""
+    """Return the mass [kg] that the tool carries, NaN if unknown; lever [m]: see `Sight`."""
     masses = [(now.lift - before.lift) / GRAVITY]
     weights = [1.0 / LIFT_DEVIATION**2]
     if lever != 0.0:
@@ -103,13 +101,20 @@ def by_mass(mass: float, expected: float, p: GraspParameters) -> Evidence:
     return Evidence(False if expected >= 2.0 * p.held_mass else None, text)
 
 
-def fused(sight: Sight, pose: Evidence, mass: Evidence) -> Evidence:
-    """Return the verdict of the pose for a tracked payload, else that of the mass; both texts."""
-    held = pose.held if sight.tracked else mass.held
-    return Evidence(held, f"{pose.text}, {mass.text}")
+def fused(sight: Sight, pose: Evidence, own: Evidence, mass: Evidence) -> Evidence:
+    """Return the verdict: of the pose for a tracked payload, else of the gripper's `own` evidence,
+    else of the mass; a gripper that feels nothing holds nothing. All texts."""
+    felt = own.held if own.held is not None else mass.held
+    held = pose.held if sight.tracked and own.held is not False else felt
+    return Evidence(held, ", ".join(filter(None, (pose.text, own.text, mass.text))))
+
+
+def against(pose: Evidence, own: Evidence) -> Evidence:
+    """Return the evidence of the pose, or the gripper's `own` where it feels nothing."""
+    return own if own.held is False else pose
 
 
 def touches_beside(sight: Sight, distance: float) -> bool:
-    """Return whether the magnet touches a payload, at least `distance` [m] beside its middle."""
-    away = sight.magnet - sight.payload
+    """Return whether the tool touches a payload, at least `distance` [m] beside its middle."""
+    away = sight.tool - sight.payload
     return bool(away[2] < REACH and np.hypot(*away[:2]) >= distance)

@@ -18,6 +18,7 @@ from uam_control.grasp.directive import Directive, Step
 from uam_control.grasp.evidence import (
     Evidence,
     Load,
+    against,
     by_mass,
     by_pose,
     by_travel,
@@ -27,8 +28,9 @@ from uam_control.grasp.evidence import (
     touches_beside,
 )
 from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.grasp.grippers import GRIPPERS, GripperKind
 from uam_control.grasp.sight import Lasting, RunningMean, Sight
-from uam_control.grasp.windows import GraspWindow
+from uam_control.grasp.windows import FROM_ABOVE, GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken
 FAR = 2.0  # of the reach: a payload beyond is out of reach without a second look
@@ -43,7 +45,7 @@ CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a c
 
 class GraspExecutive:
     """Watches the grasps of one flight; `decisions`: all so far; `grasp`: newest state; `lifted`:
-    whether the payload follows the magnet upwards, before that is a decision."""
+    whether the payload follows the tool upwards, before that is a decision."""
 
     def __init__(
         self, windows: Sequence[GraspWindow], expected: float, parameters: GraspParameters
@@ -59,8 +61,8 @@ class GraspExecutive:
         self._alignment = Alignment()
         self._load, self._before = RunningMean(), Load()
         self._stood = np.full(3, math.nan)  # grip point of the standing payload
-        self._start = np.zeros(3)  # magnet at the begin of the descent
-        self._gripped = np.full((2, 3), math.nan)  # magnet and payload at the grip
+        self._start = np.zeros(3)  # tool at the begin of the descent
+        self._gripped = np.full((2, 3), math.nan)  # tool and payload at the grip
         self._lasting, self._contact = Lasting(), Lasting()  # of a condition; of a contact
         self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
             Step.APPROACH: self._approach,
@@ -79,6 +81,11 @@ class GraspExecutive:
         """Return the window whose descent has not begun, None without one."""
         before = self._step in (Step.IDLE, Step.APPROACH, Step.ALIGN)
         return self._windows[0] if before and self._windows else None
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """Where the present window's payload is gripped (3,) [m], see `Approach`."""
+        return self._windows[0].approach.point if self._windows else FROM_ABOVE.point
 
     @property
     def due_from(self) -> float:
@@ -127,14 +134,14 @@ class GraspExecutive:
         return sight.stamp - self._since
 
     def _approach(self, sight: Sight, window: GraspWindow) -> None:
-        self._alignment.add(sight, window.dip)
+        self._alignment.add(sight, window)
         p, alignment = self.parameters, self._alignment
         if sight.time < window.descent:
             if alignment.near(p.align_range):
                 shift = self.directive.shift
                 self.directive.shift = alignment.correction(shift, p, p.align_tolerance)
             return
-        self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
+        self._stood, self._start = sight.payload.copy(), sight.tool.copy()
         beyond = sight.tracked and alignment.known and not alignment.near(self._reach)
         if beyond and not alignment.near(FAR * self._reach):
             self._leave_out(sight, window)
@@ -148,7 +155,7 @@ class GraspExecutive:
 
     def _align(self, sight: Sight, window: GraspWindow) -> None:
         p, alignment = self.parameters, self._alignment
-        alignment.add(sight, window.dip)
+        alignment.add(sight, window)
         late = self._waited(sight) >= p.align_timeout
         first_look = sight.tracked and not self._attempt
         if first_look and alignment.known and not alignment.near(self._reach):
@@ -177,7 +184,7 @@ class GraspExecutive:
 
     def _begin_descent(self, sight: Sight) -> None:
         self._attempt += 1
-        self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
+        self._stood, self._start = sight.payload.copy(), sight.tool.copy()
         self._before = self._present_load()
         self._decide(sight, Grasp.APPROACHED, f"descent, {self._alignment.text}")
         self._go(Step.DESCEND, sight)
@@ -186,24 +193,29 @@ class GraspExecutive:
         p = self.parameters
         if self._touches(sight):
             self._leave_contact(sight)
-        elif sight.tracked and self._misses(sight, p.descent_miss):
+        elif sight.tracked and self._misses(sight, window.approach.axes):
             self._go_back(sight, f"broken off, {by_pose(sight, p).text}")
-        elif sight.tracked and not self.directive.grip:
+        elif sight.tracked and self._gripper.early and not self.directive.grip:
             self.directive.grip = touches_beside(sight, self._grip_tolerance)
         if self._step is Step.DESCEND and sight.time >= window.grip:
-            self._gripped[:] = sight.magnet_then, sight.payload
+            self._gripped[:] = sight.tool_then, sight.payload
             self._go(Step.LIFT, sight)
 
     @property
+    def _gripper(self) -> GripperKind:
+        return GRIPPERS[self.parameters.gripper]
+
+    @property
     def _grip_tolerance(self) -> float:
-        """Distance [m] beside the payload from which the magnet is on at contact."""
+        """Distance [m] beside the payload from which it is gripped at contact."""
         return self.parameters.align_tolerance if self._attempt == 1 else 0.0
 
-    def _misses(self, sight: Sight, allowed: float) -> bool:
-        """Return whether the magnet is low and beside the payload, or the payload has fallen."""
-        away = sight.payload - sight.magnet
-        beside = bool(np.hypot(*away[:2]) > allowed)
-        low = sight.magnet[2] - self._stood[2] < NEAR
+    def _misses(self, sight: Sight, axes: np.ndarray) -> bool:
+        """Return whether the tool is near and beside the payload, or the payload has fallen; axes:
+        see `Approach.axes`."""
+        away = axes @ (sight.payload - sight.tool)
+        beside = bool(np.hypot(*away[:2]) > self.parameters.descent_miss)
+        low = (axes @ (sight.tool - self._stood))[2] < NEAR
         fallen = bool(self._stood[2] - sight.payload[2] > FALLEN)
         return fallen or self._lasting(sight.stamp, bool(low and beside)) >= MISSED_AFTER
 
@@ -215,14 +227,17 @@ class GraspExecutive:
         return by_mass(mass, self._expected, self.parameters)
 
     def _evidence(self, sight: Sight) -> Evidence:
-        pose = by_travel(sight, *self._gripped, self.parameters)
-        return fused(sight, pose, self._mass(sight))
+        pose, own = by_travel(sight, *self._gripped, self.parameters), self._felt(sight)
+        return fused(sight, pose, own, self._mass(sight))
+
+    def _felt(self, sight: Sight) -> Evidence:
+        return self._gripper.held(sight, self.parameters)
 
     def _lift(self, sight: Sight, window: GraspWindow) -> None:
         if self._touches(sight):
             self._leave_contact(sight)
             return
-        pose = by_travel(sight, *self._gripped, self.parameters)
+        pose = against(by_travel(sight, *self._gripped, self.parameters), self._felt(sight))
         self.lifted = pose.held is True
         if self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
             self._go_back(sight, f"not held, {pose.text}")
@@ -244,7 +259,7 @@ class GraspExecutive:
             self._go_back(sight, f"not held, {evidence.text}")
         elif self._waited(sight) < self.parameters.lift_timeout:
             self.directive.pace = 0.0
-        elif sight.tracked and self._mass(sight).held:  # near the magnet, and its weight is there
+        elif sight.tracked and self._mass(sight).held:  # near the tool, and its weight is there
             self._begin_carry(sight, Grasp.HELD, evidence.text)
         elif evidence.held is False or sight.tracked:
             self._go_back(sight, f"not held, {evidence.text}")
@@ -281,10 +296,11 @@ class GraspExecutive:
         self._leave(sight, window, Grasp.GIVEN_UP, f"given up, {reason}{where}")
 
     def _leave(self, sight: Sight, window: GraspWindow, grasp: Grasp, text: str) -> None:
-        """Leave the payload where it is: go on without the descent, or land."""
+        """Leave the payload where it is: go on without the descent, or land. A path without an
+        approach from the side would come too near to what stands there: it lands."""
         self._decide(sight, grasp, text)
         self.directive = Directive(without_descent=window)
-        if self.parameters.grasp_given_up == "land":
+        if self.parameters.grasp_given_up == "land" or not window.approach.from_above:
             self.directive.land = self.decisions[-1].text
         self._end()
 
@@ -322,7 +338,7 @@ class GraspExecutive:
         if sight.time >= window.release:
             self._go(Step.RELEASE, sight)
             return
-        beside = _across(sight.magnet - self._start) < BESIDE
+        beside = _across(sight.tool - self._start) < BESIDE
         if beside and self._touches(sight):
             self._leave_contact(sight)
             return
@@ -330,7 +346,7 @@ class GraspExecutive:
             self.directive.shift = np.zeros(3)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             return
-        evidence = by_pose(sight, p)  # without the mass: the arm moves
+        evidence = against(by_pose(sight, p), self._felt(sight))  # not the mass: the arm moves
         if self._lasting(sight.stamp, evidence.held is False) >= p.lost_after:
             self._decide(sight, Grasp.LOST, f"lost in flight, {evidence.text}")
             if p.payload_lost == "land":
@@ -339,9 +355,10 @@ class GraspExecutive:
     def _release(self, sight: Sight, window: GraspWindow) -> None:
         p = self.parameters
         pose = by_pose(sight, p)
+        gone = pose.held is False or self._gripper.let_go(sight, p)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             self._end()
-        elif pose.held is False:
+        elif gone:
             if sight.time >= window.departure or self.directive.pace == 0.0:
                 self._decide(sight, Grasp.RELEASED, f"released, payload at {place(sight.payload)}")
                 self.directive.pace = 1.0
@@ -350,7 +367,7 @@ class GraspExecutive:
             self.directive.pace = 0.0
             if not sight.tracked:
                 self.directive.pace = 1.0
-                self._decide(sight, Grasp.RELEASED, "magnet off, not verified")
+                self._decide(sight, Grasp.RELEASED, "released, not verified")
                 self._end()
             elif self._waited(sight) >= p.release_timeout + window.departure - window.release:
                 self.directive.pace = 1.0

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from uam_control.ages import FORWARDED
 from uam_control.arm.chain import ChainParameters
-from uam_control.settings.parameter_set import choice, integer, number
+from uam_control.settings.parameter_set import choice, integer, number, vector
+from uam_control.vehicle.gripper import KINDS, MAGNET
 
 
 @dataclass(frozen=True)
@@ -19,8 +20,18 @@ class GraspParameters(ChainParameters):
         ("on", "off"),
     )
     grasp_attempts: int = integer(3, "approaches to the payload before it is given up", 1, 20)
+    gripper: str = choice(MAGNET, "what holds the payload", KINDS, fixed=True)
+    gripper_opening: tuple = vector(
+        (1.0, 0.0),
+        "opening of the gripper, closed and open; a magnet: on and off",
+        "m",
+        0.0,
+        1.0,
+        2,
+    )
+    gripper_force: float = number(0.0, "limit of the force of each finger", "N", 0.0, 1000.0)
     align_tolerance: float = number(
-        0.008, "distance magnet - payload, horizontal mean, at which the descent begins", "m",
+        0.008, "distance tool - payload, horizontal mean, at which the descent begins", "m",
         0.001, 0.1,
     )  # fmt: skip
     align_swing: float = number(
@@ -34,14 +45,14 @@ class GraspParameters(ChainParameters):
         "m", 0.0, 1.0,
     )  # fmt: skip
     press_depth: float = number(
-        0.004, "end of a corrected descent: magnet below the payload's top", "m", 0.0, 0.05
+        0.004, "end of a corrected descent: tool below the payload's top", "m", 0.0, 0.05
     )
     descent_miss: float = number(
         0.025, "horizontal distance near the payload at which a descent is broken off", "m",
         0.005, 0.2,
     )  # fmt: skip
     held_distance: float = number(
-        0.05, "distance magnet - payload above which the payload is not held", "m", 0.01, 0.5
+        0.05, "distance tool - payload above which the payload is not held", "m", 0.01, 0.5
     )
     held_mass: float = number(
         0.05, "identified mass above which a payload without mocap counts as held", "kg", 0.001, 5.0
@@ -53,7 +64,7 @@ class GraspParameters(ChainParameters):
         0.3, "time of evidence against a held payload after which it is lost", "s", 0.0, 10.0
     )
     release_timeout: float = number(
-        3.0, "longest wait for the payload to leave the magnet", "s", 0.0, 60.0
+        3.0, "longest wait for the payload to leave the tool", "s", 0.0, 60.0
     )
     payload_lost: str = choice(
         "go_on", "reaction to a lost payload: go_on with the scenario, or land", ("go_on", "land")

@@ -1,4 +1,4 @@
-"""Places of the magnet in the last seconds: a mocap pose is older than the newest state."""
+"""Places of the tool in the last seconds: a mocap pose is older than the newest state."""
 
 from __future__ import annotations
 

@@ -16,33 +16,35 @@ MEMORY = 0.8  # [s] time constant of the means
 class Sight:
     """What a vehicle can measure for a grasp.
 
-    stamp [s]; time [s]: of the scenario; magnet (3,) [m, world]: face, from the estimate; error
+    stamp [s]; time [s]: of the scenario; tool (3,) [m, world]: face, from the estimate; error
     (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose;
-    magnet_then (3,) [m, world]: magnet at the stamp of that pose, default: no delay; ahead (3,)
-    [m]: way of the magnet on the path from now until the descent begins; lift
+    tool_then (3,) [m, world]: tool at the stamp of that pose, default: no delay; ahead (3,)
+    [m]: way of the tool on the path from now until the descent begins; lift
     [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
-    horizontal distance of the magnet from that joint; on_path: whether the vehicle flies on the
-    path, and not on its way back to it. NaN: unknown.
+    horizontal distance of the tool from that joint; on_path: whether the vehicle flies on the
+    path, and not on its way back to it. opening [m], squeeze [N]: of fingers. NaN: unknown.
 
-    A payload that stands is compared with `magnet`, its old pose is still true. One that may hang
-    on the magnet is compared with `magnet_then`.
+    A payload that stands is compared with `tool`, its old pose is still true. One that may hang
+    on the tool is compared with `tool_then`.
     """
 
     stamp: float
     time: float
-    magnet: np.ndarray
+    tool: np.ndarray
     error: np.ndarray = field(default_factory=lambda: np.zeros(3))
     payload: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     lift: float = math.nan
     effort: float = math.nan
     lever: float = 0.0
     on_path: bool = True
-    magnet_then: np.ndarray | None = None
+    tool_then: np.ndarray | None = None
     ahead: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    opening: float = math.nan
+    squeeze: float = math.nan
 
     def __post_init__(self) -> None:
-        if self.magnet_then is None:
-            self.magnet_then = self.magnet
+        if self.tool_then is None:
+            self.tool_then = self.tool
 
     @property
     def tracked(self) -> bool:

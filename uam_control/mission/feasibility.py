@@ -42,7 +42,7 @@ from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
 from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
-from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
+from uam_control.vehicle import NO_GRIPPER, VehicleDescription, VehicleError, chain_of
 
 STEP = 0.01  # [s] between two checks
 PART = 60000  # checks in one part of a long flight
@@ -208,9 +208,10 @@ class Feasibility:
                 (f"joint {i + 1} rate", rate, self.vehicle.servos[i].no_load_speed, "rad/s"),
                 (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
             ]
-        if self.vehicle.has_magnet:
-            holding = self.vehicle.numbers["magnet"]["holding_force"]
-            found.append(("force on the magnet", demand.magnet_force, holding, "N"))
+        if (gripper := self.vehicle.gripper).kind != NO_GRIPPER:
+            found.append(
+                (f"force on the {gripper.name}", demand.magnet_force, gripper.holding, "N")
+            )
         return found
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:

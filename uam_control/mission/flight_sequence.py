@@ -52,11 +52,12 @@ from uam_control.supervision import (
     StateTransition,
     Supervisor,
 )
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import NO_GRIPPER, TWO_FINGER, VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
 # landings after a hold that nobody asked for here: not where a stand is
 UNASKED = (Event.HELD_TOO_LONG, Event.CLEAR_TO_LAND)
+NEARLY = 0.1  # of a gripper's stroke: as near to its closed end, a command closes it
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
@@ -367,6 +368,26 @@ class FlightSequence:
             return False, "refused: not while disarmed"
         self._override.give(on, self._scenario_magnet())
         return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
+
+    def command_gripper(self, opening: float) -> tuple[bool, str]:
+        """Close or open the gripper as `switch_magnet` does; opening [m], 0 or 1 of a magnet."""
+        p = self._parameters
+        closed, opened = p.gripper_opening
+        if p.gripper == NO_GRIPPER:
+            return False, "refused: the vehicle has no gripper"
+        if not min(closed, opened) <= opening <= max(closed, opened):
+            return False, f"refused: opening {opening:g} is outside {closed:g} to {opened:g}"
+        close = abs(opening - closed) <= NEARLY * abs(opened - closed)
+        accepted, reason = self.switch_magnet(close)
+        done = f"{'closes' if close else 'opens'} until the scenario grips or opens next"
+        return accepted, done if accepted else reason
+
+    @property
+    def gripper_state(self) -> float:
+        """The measured opening [m]; of a magnet 1 on, 0 off; NaN: unknown."""
+        if self._parameters.gripper != TWO_FINGER:
+            return float(self.output.magnet)
+        return math.nan if self._seen is None else self._seen.readings.grip.item(0)
 
     def _wait(self, state: np.ndarray, armed: bool) -> None:
         """Start by itself if it may; in a dry run follow the pose of the first state (3, 6 + n).

@@ -70,7 +70,7 @@ class PayloadWatch:
         self, scenario: Scenario, guidance: Guidance, parameters: MissionParameters
     ) -> None:
         self.memory = record("", "stepped due_from")
-        windows = grasp_windows(scenario.motions, scenario.magnet)
+        windows = grasp_windows(scenario.motions, scenario.magnet, dict(scenario.approaches))
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
         self.configure(parameters)
@@ -78,10 +78,10 @@ class PayloadWatch:
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
         self._due = prepared(due, self.memory, 0.0, 0.0)
-        self._places = PlaceHistory()  # of the magnet
-        self._planned: tuple[GraspWindow, np.ndarray] | None = None  # magnet at its descent
+        self._places = PlaceHistory()  # of the tool
+        self._planned: tuple[GraspWindow, np.ndarray] | None = None  # tool at its descent
         self._left_out: GraspWindow | None = None
-        self._stands = [self._magnet_at(window.grip)[:Z] for window in windows]
+        self._stands = [self._tool_at(window.grip)[:Z] for window in windows]
 
     @property
     def decisions(self) -> list[GraspDecision]:
@@ -108,7 +108,7 @@ class PayloadWatch:
 
     @property
     def grip(self) -> bool:
-        """Whether the magnet is on before the scenario switches it on."""
+        """Whether the tool is on before the scenario switches it on."""
         return self.executive.directive.grip
 
     @property
@@ -145,37 +145,38 @@ class PayloadWatch:
 
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:
         p, chi = self._parameters, state[CHI]
-        magnet, levers = self._hand_at(chi)
-        self._places.add(readings.stamp, magnet)
+        tool, levers = self._hand_at(chi)
+        self._places.add(readings.stamp, tool)
         sight = Sight(
             stamp,
             self._guidance.scenario_time,
-            magnet,
+            tool,
             error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
             lift=readings.lift,
             lever=float(levers[self._loaded]),
             on_path=not self._guidance.coming_back,
         )
+        sight.opening, sight.squeeze = readings.grip.tolist()
         if self._hand and -AHEAD <= readings.payload_age <= p.payload_age:
-            sight.payload = readings.payload_position.copy()
-            sight.magnet_then = self._places.at(readings.stamp - readings.payload_age)
+            sight.payload = readings.payload_position + self.executive.point
+            sight.tool_then = self._places.at(readings.stamp - readings.payload_age)
             self._look_ahead(sight)
         if len(readings.joint_effort):
             sight.effort = float(readings.joint_effort[self._loaded])
         return sight
 
     def _look_ahead(self, sight: Sight) -> None:
-        """Set the magnet's way on the path until the descent begins, without the path's shift."""
+        """Set the tool's way on the path until the descent begins, without the path's shift."""
         window = self.executive.aligns_for
         if window is None:
             return
         if self._planned is None or self._planned[0] is not window:
-            self._planned = window, self._magnet_at(window.descent)
+            self._planned = window, self._tool_at(window.descent)
         now, _ = self._hand_at(self._guidance.reference[CHI])
         sight.ahead = self._planned[1] - now + self._shift.value
 
-    def _magnet_at(self, time: float) -> np.ndarray:
-        """Return the magnet's place (3,) [m] on the path at `time` [s] of the scenario."""
+    def _tool_at(self, time: float) -> np.ndarray:
+        """Return the tool's place (3,) [m] on the path at `time` [s] of the scenario."""
         guidance = self._guidance
         motion = np.zeros_like(guidance.motion)
         guidance.trajectory.write(time, motion)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64
 
 from uam_control.coordinates import ARM, ATTITUDE, CHI
 from uam_control.grasp import Grasp
@@ -128,6 +128,8 @@ class MissionNode(UamNode):
         self._path = self.publisher(topics.PATH)
         self._hand = self.publisher(topics.END_EFFECTOR_REFERENCE)
         self._flyer, self._hand_due = described_hand(vehicle), 0  # [ns]
+        self._gripper, self._gripper_due = self.publisher(topics.GRIPPER_STATE), 0
+        self.listen(topics.GRIPPER_COMMAND, self._on_gripper, required=False)
         self._path_of = ""  # the plan that was published, see _publish_path
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
@@ -187,6 +189,10 @@ class MissionNode(UamNode):
         self._mission.lose_states(f"no state of the estimator for {silence:.2f} s: IMU lost?")
         self._publish_status(self.stamp + round(silence * SECOND))
 
+    def _on_gripper(self, message: Float64) -> None:
+        _, text = self._mission.command_gripper(message.data)
+        self.get_logger().info(f"gripper {message.data:g}: {text}")
+
     def _on_checklist(self, message: DiagnosticArray) -> None:
         stamp, state = ChecklistState.from_message(message)
         report = ChecklistReport(stamp / SECOND, state.passed, state.failing, state.commands)
@@ -229,8 +235,11 @@ class MissionNode(UamNode):
         self._publish_status(stamp)
 
     def answer(self) -> None:
-        """Publish the magnet, for which the plant waits."""
+        """Publish the magnet, for which the plant waits, and the state of the gripper."""
         self._magnet.publish(SWITCH[bool(self.stage.output.magnet)])
+        if self.stage.ahead >= self._gripper_due and self._gripper.get_subscription_count():
+            self._gripper_due = self.stage.ahead + HAND_PERIOD
+            self._gripper.publish(Float64(data=self._mission.gripper_state))
 
     def send(self) -> None:
         """Publish the newest reference, with the stamp of its tick."""

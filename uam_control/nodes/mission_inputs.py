@@ -13,7 +13,14 @@ from uam_control.nodes.pose_source import PoseSource
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_efforts, read_imu, read_pose, read_values
+from uam_msgs_py.messages.convert import (
+    GRIPPER,
+    read_efforts,
+    read_grip,
+    read_imu,
+    read_pose,
+    read_values,
+)
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.node.base_node import UamNode
 
@@ -80,12 +87,17 @@ class MissionInputs:
     def _on_joints(self, data: bytes) -> None:
         stamp, effort = read_efforts(data, self._names)
         self._inputs.joints(stamp / SECOND, effort)
+        if (grip := read_grip(data)) is not None:
+            self._inputs.grip(grip)
 
     def _on_battery(self, message: BatteryState) -> None:
         self._inputs.battery(message.percentage)
 
     def _on_temperature(self, message: Temperature) -> None:
         joint = message.header.frame_id
+        if joint == GRIPPER:
+            self._inputs.temperature(joint, message.temperature)
+            return
         if joint not in self._names:
             raise BadMessage(f"frame_id {joint!r} is no joint; there are: {', '.join(self._names)}")
         self._inputs.temperature(joint, message.temperature)

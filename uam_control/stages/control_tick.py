@@ -35,7 +35,18 @@ from uam_control.stages.law_stages import (
     position_step,
 )
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.signals import IMU, JOINTS, PAYLOAD, POSES, Imu, Joints, Pose, Signals
+from uam_control.stages.signals import (
+    GRIP,
+    IMU,
+    JOINTS,
+    PAYLOAD,
+    POSES,
+    Grip,
+    Imu,
+    Joints,
+    Pose,
+    Signals,
+)
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, Stage, Step
 from uam_control.stages.supervisor_inputs import BIAS, GAINS, LIFT, keep, read_inputs
 from uam_control.stages.timing import Timing
@@ -121,6 +132,7 @@ class ControlTick:
         joints: Joints | None = None,
         imu: Imu | None = None,
         payload: Pose | None = None,
+        grip: Grip | None = None,
     ) -> bool:
         """Run one tick with the samples that have arrived; all stamps in [ns].
 
@@ -130,7 +142,7 @@ class ControlTick:
         signals = self.signals
         signals.poses = () if mocap is None else (mocap,)
         signals.joints, signals.imu = joints, imu
-        signals.payload = payload
+        signals.payload, signals.grip = payload, grip
         return self.go_on(0)
 
     def go_on(self, first: int) -> bool:
@@ -160,6 +172,8 @@ def listen(tick: ControlTick) -> bool:
         inputs.put(supervisor_inputs.JOINTS, s.joints[0], s.joints[3])
     if s.payload is not None:
         inputs.put(supervisor_inputs.PAYLOAD, *s.payload[:2])
+    if s.grip is not None:
+        inputs.put(supervisor_inputs.GRIP, *s.grip)
     return True
 
 
@@ -296,6 +310,8 @@ def listen_step(a: tuple) -> int:
         keep(inputs, supervisor_inputs.JOINTS, s.stamps[JOINTS], s.joints[2])
     if s.stamps[PAYLOAD] >= 0:
         keep(inputs, supervisor_inputs.PAYLOAD, s.stamps[PAYLOAD], s.payload)
+    if s.stamps[GRIP] >= 0:
+        keep(inputs, supervisor_inputs.GRIP, s.stamps[GRIP], s.grip)
     return DONE
 
 

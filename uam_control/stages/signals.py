@@ -14,8 +14,9 @@ from uam_control.setpoints.setpoint_source import Setpoint
 
 Pose = tuple[int, np.ndarray, np.ndarray]  # stamp [ns], position (3,) [m], quaternion [w x y z]
 Joints = tuple[int, np.ndarray, np.ndarray, np.ndarray]  # stamp, angles, speeds, efforts (n,)
+Grip = tuple[int, np.ndarray]  # stamp, opening [m] and closing force [N] of fingers (2,)
 Imu = tuple[int, np.ndarray, np.ndarray]  # stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]
-JOINTS, IMU, PAYLOAD = range(3)  # sensors, of which a sample at most arrives at a tick
+JOINTS, IMU, PAYLOAD, GRIP = range(4)  # sensors, of which a sample at most arrives at a tick
 NOTHING = -1  # stamp of a sample that has not arrived
 POSES = 8  # that arrive at a tick, at most
 
@@ -24,8 +25,8 @@ class SignalArrays(NamedTuple):
     """What compiled stages have of the `Signals`.
 
     exposed (POSES,) [ns], poses (POSES, 7): stamps, positions and quaternions, in order of the
-    stamps, NOTHING behind the last; stamps (3,) [ns]: of the other sensors' samples; joints (3, n);
-    imu (2, 3); payload (3,): position. numbers (1,): stamp [ns], time [s].
+    stamps, NOTHING behind the last; stamps (4,) [ns]: of the other sensors' samples; joints (3, n);
+    imu (2, 3); payload (3,): position; grip (2,). numbers (1,): stamp [ns], time [s].
     """
 
     exposed: np.ndarray
@@ -34,6 +35,7 @@ class SignalArrays(NamedTuple):
     joints: np.ndarray
     imu: np.ndarray
     payload: np.ndarray
+    grip: np.ndarray
     state: np.ndarray
     reference: np.ndarray
     attitude_reference: np.ndarray
@@ -66,6 +68,7 @@ class Signals:
     joints: Joints | None = None
     imu: Imu | None = None
     payload: Pose | None = None
+    grip: Grip | None = None
     late: float = 0.0  # [s] for which the tick has waited while a process stood still
     # mission
     flying: bool = False  # whether position and attitude are controlled
@@ -97,15 +100,15 @@ class Signals:
         """Return new arrays for samples, and those of the signals."""
         n = self.state.shape[1] - ALPHA
         return SignalArrays(
-            *(np.full(POSES, NOTHING), np.zeros((POSES, 7)), np.full(3, NOTHING)),
-            *(np.zeros((3, n)), np.zeros((2, 3)), np.zeros(3)),
+            *(np.full(POSES, NOTHING), np.zeros((POSES, 7)), np.full(4, NOTHING)),
+            *(np.zeros((3, n)), np.zeros((2, 3)), np.zeros(3), np.zeros(2)),
             *(self.state, self.reference, self.attitude_reference, self.tau_p, self.tau_q),
             self.memory,
         )
 
     def put(self, a: SignalArrays) -> None:
         """Copy the samples into the arrays for compiled stages."""
-        samples = self.joints, self.imu, self.payload
+        samples = self.joints, self.imu, self.payload, self.grip
         a.stamps[:] = [NOTHING if sample is None else sample[0] for sample in samples]
         a.exposed[:] = NOTHING
         for i, (stamp, position, quaternion) in enumerate(self.poses[-POSES:]):
@@ -116,3 +119,5 @@ class Signals:
             a.imu[:] = self.imu[1:]
         if self.payload is not None:
             a.payload[:] = self.payload[1]
+        if self.grip is not None:
+            a.grip[:] = self.grip[1]

@@ -31,7 +31,7 @@ from uam_control.supervision.inputs import (
 READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
 Kept = tuple[Callable[..., None], tuple, int]  # reader, its arguments, tick answered [ns]
 # messages of stages; GAINS: of the first of three laws
-MOCAP, JOINTS, PAYLOAD, BIAS, LIFT, GAINS = range(6)
+MOCAP, JOINTS, PAYLOAD, GRIP, BIAS, LIFT, GAINS = range(7)
 KINDS = GAINS + len(SUBSYSTEMS)
 
 
@@ -39,7 +39,8 @@ class StageArrays(NamedTuple):
     """Messages of stages, and the arrays of the inputs.
 
     waits (KINDS,): whether a message of each kind is not read yet; at (KINDS,) [ns]: its stamp;
-    values (KINDS, m): of a pose position and quaternion, of the joints their efforts. watched:
+    values (KINDS, m): of a pose position and quaternion, of the joints their efforts, of fingers
+    opening and force. watched:
     places of the gains with a limit. clock, numbers (1,): of `SupervisorInputs`.
     """
 
@@ -140,6 +141,10 @@ class SupervisorInputs:
         """Read the joints at `stamp` [ns]; of alpha, alpha_dot, effort (n,) only effort [N m]."""
         self.inputs.joints(stamp / SECOND, effort)
 
+    def grip(self, stamp: int, grip: np.ndarray) -> None:
+        """Read opening [m] and closing force [N] of fingers (2,) at `stamp` [ns]."""
+        self.inputs.grip(grip)
+
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
         if stamp - self._read_at >= READ_PERIOD or stamp < self._read_at:
@@ -191,6 +196,8 @@ def read_messages(a: StageArrays, stamp: int) -> None:
     if waits[PAYLOAD]:
         m.payload = at[PAYLOAD] / SECOND
         put(values[PAYLOAD], inputs.payload)
+    if waits[GRIP]:
+        put(values[GRIP], inputs.grip)
     if waits[BIAS]:
         take_bias(inputs, at[BIAS] / SECOND, values[BIAS, :3])
     if waits[LIFT]:

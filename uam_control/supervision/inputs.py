@@ -32,12 +32,13 @@ REAL = (
 
 
 class InputArrays(NamedTuple):
-    """State of `Inputs`. readings (1,), known, payload (3,): of `Readings`; bias_mean (3,) [m/s^2];
-    newest (7,): of `Repeats`; numbers (1,): see REAL."""
+    """State of `Inputs`. readings (1,), known, payload (3,), grip (2,): of `Readings`; bias_mean
+    (3,) [m/s^2]; newest (7,): of `Repeats`; numbers (1,): see REAL."""
 
     readings: np.ndarray
     known: ReadingArrays
     payload: np.ndarray
+    grip: np.ndarray
     bias_mean: np.ndarray
     newest: np.ndarray
     numbers: np.ndarray
@@ -71,7 +72,7 @@ class Inputs:
 
     def _make_arrays(self, bias_mean: np.ndarray, newest: np.ndarray) -> None:
         r = self._readings
-        known = r.memory, r.arrays, r.payload_position
+        known = r.memory, r.arrays, r.payload_position, r.grip
         self.arrays = InputArrays(*known, bias_mean, newest, self.memory)
 
     @property
@@ -101,6 +102,10 @@ class Inputs:
         """Store the grip point (3,) [m, world] of the payload, exposed at `stamp` [s]."""
         self.memory["payload"] = stamp
         self._readings.payload_position[:] = position
+
+    def grip(self, grip: np.ndarray) -> None:
+        """Store opening [m] and closing force [N] of fingers (2,)."""
+        self._readings.grip[:] = grip
 
     def accelerometer_bias(self, stamp: float, bias: np.ndarray) -> None:
         """See `take_bias`."""

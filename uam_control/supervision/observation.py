@@ -71,9 +71,10 @@ class Readings:
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
-    payload_age [s]: of that pose. lift [N]: filtered collective thrust. contradiction [m/s^2]: of
-    motion capture and IMU, the fast change of the accelerometer's estimated bias. slower: than the
-    wall clock, 1 − real-time factor of a simulation. `values`: all NUMBERS.
+    payload_age [s]: of that pose. grip (2,): opening [m] and closing force [N] of fingers. lift
+    [N]: filtered collective thrust. contradiction [m/s^2]: of motion capture and IMU, the fast
+    change of the accelerometer's estimated bias. slower: than the wall clock, 1 − real-time factor
+    of a simulation. `values`: all NUMBERS.
     """
 
     battery, temperature, missed_ticks, slower, contradiction, lift = (Number() for _ in range(6))
@@ -88,6 +89,7 @@ class Readings:
         self.values[:] = math.nan
         self.joint_effort, self.gains = np.zeros(0), np.full(3, math.nan)
         self.mocap_position, self.payload_position = np.full((2, 3), math.nan)
+        self.grip = np.full(2, math.nan)
         for name, value in known.items():
             setattr(self, name, value)
 

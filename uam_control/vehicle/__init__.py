@@ -14,6 +14,7 @@ from uam_control.vehicle.description import (
     Servo,
     VehicleDescription,
 )
+from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER, Gripper
 from uam_control.vehicle.loading import (
     AUTOPILOT_FILE,
     DEFAULT_VEHICLE,
@@ -22,3 +23,4 @@ from uam_control.vehicle.loading import (
     designed,
     load_description,
 )
+from uam_control.vehicle.model import model_spec

@@ -9,6 +9,7 @@ import numpy as np
 from uam_control.arm.chain import JOINTS, Chain, with_point
 from uam_control.vehicle.description import VehicleDescription
 from uam_control.vehicle.loading import VehicleError
+from uam_control.vehicle.model import model_spec
 
 if TYPE_CHECKING:
     import mujoco
@@ -21,10 +22,8 @@ Lump = tuple[float, np.ndarray, np.ndarray]  # mass [kg], centre (3,) [m], inert
 
 def chain_of(vehicle: VehicleDescription) -> Chain:
     """Return the arm of a vehicle. Raises VehicleError: one line with the MJCF and the reason."""
-    import mujoco  # takes 0.3 s and chooses its renderer: only where an arm is read
-
     try:
-        model = mujoco.MjModel.from_xml_path(str(vehicle.model))
+        model = model_spec(vehicle).compile()
         return read_chain(model, vehicle.joint_names, vehicle.end_effector)
     except ValueError as error:
         reason = " ".join(str(error).removeprefix("Error: ").split())

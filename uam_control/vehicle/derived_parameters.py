@@ -8,6 +8,7 @@ from typing import Any
 from uam_control.arm.chain import as_parameters
 from uam_control.vehicle.chain_reader import chain_of
 from uam_control.vehicle.description import AXES, VehicleDescription
+from uam_control.vehicle.gripper import MAGNET, TWO_FINGER, Gripper
 from uam_control.vehicle.loading import VehicleError
 
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
@@ -44,6 +45,7 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
                 round(0.5 * (joint.low + joint.high), 6) for joint in vehicle.joints
             ],
             "joint_effort_hold": [servo.effort_limit for servo in vehicle.servos],
+            **_grip(vehicle.gripper),
             **arm,
         },
         "mavlink_bridge": {
@@ -62,6 +64,18 @@ def _load_friction(vehicle: VehicleDescription) -> dict[str, list[float]]:
     servos = map(vehicle.servo_numbers, range(len(vehicle.joints)))
     shares = [float(one.get("load_friction", 0.0)) for one in servos]
     return {"joint_load_friction": shares} if any(shares) else {}
+
+
+def _grip(gripper: Gripper) -> dict[str, Any]:
+    """Return what the executive of the grasps knows of a gripper that is no magnet."""
+    if gripper.kind != TWO_FINGER:
+        return {} if gripper.kind == MAGNET else {"gripper": gripper.kind}
+    return {
+        "gripper": gripper.kind,
+        "gripper_opening": list(gripper.opening),
+        "gripper_force": gripper.force,
+        "press_depth": gripper.grip_depth,
+    }
 
 
 def _integral_ratios(vehicle: VehicleDescription) -> list[float]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from uam_control.coordinates import coordinates
 from uam_control.settings import configuration
+from uam_control.vehicle.gripper import MAGNET, Gripper, gripper_of
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
 GRAVITY = 9.81  # [m/s^2] of parameter sets that no vehicle's description fills
@@ -128,9 +129,20 @@ class VehicleDescription:
         return self.profiles.get(law, "")
 
     @property
+    def models(self) -> tuple[Path, ...]:
+        """The MJCF files of the vehicle and of its gripper."""
+        part = self.numbers.get("gripper")
+        return (self.model,) if part is None else (self.model, Path(part["model"]))
+
+    @property
+    def gripper(self) -> Gripper:
+        """What holds a payload."""
+        return gripper_of(self.numbers)
+
+    @property
     def has_magnet(self) -> bool:
         """Whether the arm has a magnet."""
-        return "magnet" in self.numbers
+        return self.gripper.kind == MAGNET
 
     @property
     def joint_names(self) -> tuple[str, ...]:

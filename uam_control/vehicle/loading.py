@@ -17,6 +17,7 @@ from uam_control.vehicle.description import (
     Servo,
     VehicleDescription,
 )
+from uam_control.vehicle.gripper import check_gripper, completed
 from uam_control.vehicle.plant_numbers import check_plant_numbers
 from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_control.vehicle.servo_types import merged, servo_types
@@ -41,7 +42,38 @@ def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescr
     exist.
     """
     file = configuration.named("vehicle", str(name_or_file), suffixes=(".yaml",))
-    return describe(read_section(file, VehicleError).values, file)
+    return describe(_derived(file), file)
+
+
+def _derived(file: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Return the content of a vehicle's file; with `derives`, its entries replace those of the
+    vehicle that it names, entry by entry; null leaves one out."""
+    top = read_section(file, VehicleError)
+    if not top.has("derives"):
+        return top.values
+    other = configuration.named(
+        "vehicle", configuration.beside(file, "vehicle", top.text("derives")), (".yaml",)
+    )
+    if other.resolve() in (*above, file.resolve()):
+        raise top.error("derives", f"{other.name} derives from {file.name}")
+    base = _derived(other, (*above, file.resolve()))
+    here = Section(base, f"{other}:", VehicleError)
+    base = base | {"model": str(other.parent / here.text("model"))}
+    if profiles := _profiles(here, other):
+        base["profiles"] = profiles
+    if here.has("autopilot"):
+        base["autopilot"] = configuration.beside(other, "autopilot", here.text("autopilot"))
+    own = {key: value for key, value in top.values.items() if key != "derives"}
+    return _replaced(base, own)
+
+
+def _replaced(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Return `base` with the entries of `own` in it, mappings entry by entry, without nulls."""
+    found = base | own
+    for key in base.keys() & own.keys():
+        if isinstance(base[key], dict) and isinstance(own[key], dict):
+            found[key] = _replaced(base[key], own[key])
+    return {key: value for key, value in found.items() if value is not None}
 
 
 def designed(file: Path, kind: str) -> Path:
@@ -51,6 +83,7 @@ def designed(file: Path, kind: str) -> Path:
 
 def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     """Return the checked description in `document`, the content of `file`. Raises VehicleError."""
+    document = completed(document, file, VehicleError)
     top = Section(document, f"{file}:", VehicleError)
     model = file.parent / top.text("model")
     if not model.is_file():
@@ -77,6 +110,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     _check_rotors(described, rotor)
     _check_hover(described)
     check_plant_numbers(top, servos)
+    check_gripper(top)
     top.has("arm")  # of older files: told in a note of the flight
     top.only_asked()
     return described

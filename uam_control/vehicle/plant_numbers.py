@@ -9,7 +9,9 @@ from uam_control.settings.section import Section
 # entries that only the description and what is made of it read; a change of them has no effect
 NOT_OF_THE_PLANT = (
     *("model", "profiles", "autopilot", "control_period", "mass", "gravity", "joints", "arm"),
-    "end_effector",
+    *("end_effector", "gripper.kind", "gripper.type", "gripper.model", "gripper.body"),
+    *("gripper.instead_of", "gripper.position", "gripper.mass", "gripper.friction"),
+    "gripper.grip_depth",
     *("rotors.layout", "rotors.radius", "rotors.moment_ratio"),
     *("servos.effort_limit", "servos.load_friction"),
 )

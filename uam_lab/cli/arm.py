@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         return AS_DESCRIBED
     try:
         driver.start()
-        rows = [state(driver, i) for i in range(len(driver.chain.servos))]
+        rows = [state(driver, i) for i in range(len(driver.chain.arm))]
     except ArmError as error:
         say(str(error).replace("; ", "\n"))
         return OTHERWISE
@@ -115,7 +115,7 @@ def driver_of(
 
 def state(driver: ArmDriver, i: int) -> tuple[str, ...]:
     """Return the cells of servo i."""
-    servo, angle = driver.chain.servos[i], driver.start_angles[i]
+    servo, angle = driver.chain.arm[i], driver.start_angles[i]
     firmware, heat, voltage = (
         tried(driver.bus.read, servo.id, servo.table[name])
         for name in (names.FIRMWARE, names.PRESENT_TEMPERATURE, names.PRESENT_VOLTAGE)

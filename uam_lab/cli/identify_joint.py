@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
         return NOT_DONE
     finally:
         driver.stop()
-    text = pasted(options.joint, driver.chain.servos[joint].torque_scale, fit)
+    text = pasted(options.joint, driver.chain.arm[joint].torque_scale, fit)
     (out / "identification.yaml").write_text(text, encoding="utf-8")
     columns = (record.times, record.position[:, joint], record.effort[:, joint], loads)
     head = "time_s,angle_rad,effort_nm,weight_nm"

@@ -31,6 +31,9 @@ W_FIRST = np.array([3, 0, 1, 2])  # x y z w of ROS → w x y z
 SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
 
 
+GRIPPER = "gripper"  # among the joints: opening [m] and closing force [N] of two fingers
+
+
 class JointStateWriter(Template):
     """Writes a JointState: set the views position, velocity, effort (n,), publish `stamped`."""
 
@@ -90,6 +93,18 @@ def read_efforts(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray]:
         except ValueError:
             check_names(order, names)
     return stamp, effort
+
+
+def read_grip(data: bytes) -> np.ndarray | None:
+    """Return opening [m] and closing force [N] (2,) of the fingers in a JointState, None without.
+
+    Raises BadMessage for a message that contradicts itself.
+    """
+    _, names, opening = read_values(data, "position")
+    if GRIPPER not in names:
+        return None
+    number, force = names.index(GRIPPER), read_values(data, "effort")[2]
+    return np.array([opening[number], force[number]])
 
 
 class ImuWriter(Template):

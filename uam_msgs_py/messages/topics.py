@@ -121,7 +121,8 @@ CLOCK = Topic("clock", Clock, _qos(1, reliable=False), "", "s", TICK, PLANT, to=
 IMU = Topic("imu/data", Imu, SENSOR_DATA, BODY, "rad/s, m/s²", TICK, PLANT, to=(ESTIMATOR,),
     about="body rates and specific force, FLU")
 JOINTS = Topic("joint_states", JointState, SENSOR_DATA, JOINT_SPACE, "rad, rad/s, N m", TICK,
-    PLANT, to=(ESTIMATOR, MISSION), about="alpha_1, alpha_2")
+    PLANT, to=(ESTIMATOR, MISSION),
+    about="alpha_1, alpha_2; of a two-finger gripper `gripper`: opening m, closing force N")
 MOCAP = Topic("vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, WORLD, POSE, CAMERAS, PLANT,
     to=(ESTIMATOR, MISSION, BRIDGE), about="motion capture, world")
 ODOMETRY_IN = Topic("odometry/in", Odometry, SENSOR_DATA, "world, map or odom", POSE,
@@ -158,6 +159,8 @@ MAGNET_STATE = Topic("uam/magnet/state", Bool, LATCHED, "", "on or off", "1 Hz a
     "magnet_driver or mavlink_bridge", readers=RECORDER, one_publisher=False,
     about="magnet as its driver has switched it: acknowledged by the autopilot or read back "
     "from the line; not simulated")
+GRIPPER_STATE = Topic("gripper/state", Float64, RELIABLE, "", "m, or 0/1", ASKED_FOR, MISSION,
+    readers="your program", recorded=False, about="measured opening; of a magnet the command")
 SETPOINT = Topic("uam/setpoint", TwistStamped, RELIABLE, BODY, "rad/s, thrust 0..1", TICK, BRIDGE,
     to=(PLANT,), about="body rates FLU and thrust 0..1 (linear.z) as sent")
 THRUST = Topic("uam/thrust", JointState, RELIABLE, "", "1, N", "10 Hz", BRIDGE, to=(MISSION,),
@@ -226,8 +229,8 @@ END_EFFECTOR_TWIST = Topic("end_effector/twist", TwistStamped, PLANS, "world or 
     "m/s, rad/s", "10 Hz or more", "teleop, planners", readers=MISSION, one_publisher=False,
     about="jog of the end effector; it stops when silent")
 GRIPPER_COMMAND = Topic("gripper/command", Float64, PLANS, "", "m, or 0/1", ON_CHANGE,
-    "teleop, your program", readers="your gripper", one_publisher=False,
-    about="opening of a two-finger gripper, a magnet 0/1")
+    "teleop, your program", readers="mission, mujoco_sim, arm_driver", one_publisher=False,
+    about="opening of a two-finger gripper, a magnet 0/1; until the scenario grips or opens next")
 JOY = Topic("joy", Joy, SENSOR_DATA, "", "-1..1, 0 or 1", "of the gamepad", "joy_node",
     readers="teleop", one_publisher=False, recorded=False, about="axes and buttons of a gamepad")
 
@@ -250,7 +253,7 @@ TRUTH_PAYLOAD = Topic("uam/truth/payload", PoseStamped, RELIABLE, WORLD, POSE, T
 TRUTH_ROTORS = Topic("uam/truth/rotors", JointState, RELIABLE, "", "0..1, rad/s, N", TICK, PLANT,
     to=(), about="rotor_1..4: command 0..1, speed rad/s, thrust N")
 TRUTH_MAGNET = Topic("uam/truth/magnet", JointState, RELIABLE, "", "on or off, N, rad", TICK,
-    PLANT, to=(), about="magnet: on 0/1, holding force N; swing: angle rad")
+    PLANT, to=(), about="magnet: on 0/1, holding force N; swing: angle rad; gripper: m, N")
 
 # For RViz and Foxglove. A lost message is no problem: the next one is complete.
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, BODY, "URDF", ONCE, SCENE,

@@ -10,6 +10,7 @@ The plant's own delays of sensors and commands are off where a device has its ow
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,12 @@ from uam_control.coordinates import ALPHA, CHI, CHI_DOT, POSITION
 from uam_control.vehicle import POSITION_SERVO, VehicleDescription
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
-from uam_sim_bridge.devices.dynamixel.emulated import ArmShafts, EmulatedBus, EmulatedServo
+from uam_sim_bridge.devices.dynamixel.emulated import (
+    ArmShafts,
+    EmulatedBus,
+    EmulatedServo,
+    JointShaft,
+)
 from uam_sim_bridge.devices.dynamixel.startup import required_mode
 from uam_sim_bridge.devices.mocap.calibration import Calibration
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
@@ -108,11 +114,13 @@ class Laboratory:
         self._weight = vehicle.numbers["mass"] * vehicle.numbers["gravity"]
         self._in_position_mode = vehicle.numbers["servos"]["mode"] == POSITION_SERVO
         chain, mounted = devices.chain, mistaken_chain(devices.chain, self.wiring)
-        self.shafts = ArmShafts(mounted)
-        self._hand = np.zeros(len(mounted))  # (n,) [N m] of the person on the joints
+        joints = len(chain.arm)
+        self.shafts, self._fingers = ArmShafts(mounted[:joints]), ArmShafts(mounted[joints:])
+        self._hand = np.zeros(joints)  # (n,) [N m] of the person on the joints
         self._turn_shafts(self.plant.truth())
         mode = required_mode(vehicle.numbers["servos"]["mode"])
-        self.servos = servos_of(chain, mounted, self.shafts, mode)
+        shafts = [*self.shafts.shafts, *self._fingers.shafts]
+        self.servos = servos_of(chain, mounted, shafts, mode)
         self.bus = EmulatedBus(
             self.servos,
             timing=True,
@@ -173,6 +181,7 @@ class Laboratory:
     def step(self, motors: np.ndarray, truth: Truth) -> None:
         """Advance one control period with the commands of the devices."""
         self.magnet = self._switched()
+        self._turn_fingers(truth)
         command = self.shafts.command(self._in_position_mode)
         self._driven = self._driven or bool(np.any(np.nan_to_num(command)))
         joints = self.grip.joints
@@ -185,7 +194,20 @@ class Laboratory:
         else:
             command = command + self._hand
         self.plant.push(*hands.wrench(self.grip, truth.state, self._weight))
-        self.plant.step(motors, command, self.magnet)
+        # the gripper's servo has a goal of its own
+        self.plant.step(motors, command, self.magnet and not self._fingers.shafts)
+
+    def _turn_fingers(self, truth: Truth) -> None:
+        """Give the gripper's servo its state, and the fingers the goal of the servo."""
+        if not self._fingers.shafts:
+            return
+        lever, (closed, opened) = self.devices.chain.transmission, self.description.gripper.opening
+        opening, force = truth.grip
+        self._fingers.set(*(np.array([one]) for one in (opening / lever, 0.0, -force * lever)))
+        goal = self._fingers.command(True).item() * lever
+        if math.isfinite(goal):  # without torque the gear keeps them where they are
+            self.plant.open_to(goal)
+            self.magnet = goal < 0.5 * (closed + opened)
 
     def _turn_shafts(self, truth: Truth) -> None:
         """Give the servos angles, velocities and torques of this tick."""
@@ -218,11 +240,11 @@ class Laboratory:
 
 
 def servos_of(
-    chain: ArmChain, mounted: Sequence[ServoDescription], shafts: ArmShafts, mode: int
+    chain: ArmChain, mounted: Sequence[ServoDescription], shafts: Sequence[JointShaft], mode: int
 ) -> list[EmulatedServo]:
     """Return the servos in the order of the joints, set up as described; mode: Operating Mode."""
     made = []
-    for servo, shaft in zip(mounted, shafts.shafts, strict=True):
+    for servo, shaft in zip(mounted, shafts, strict=True):
         one = EmulatedServo(
             servo.id,
             shaft,
@@ -231,7 +253,7 @@ def servos_of(
             current_unit=servo.current_unit,
         )
         one.set(names.RETURN_DELAY, chain.return_delay_counts)
-        one.set(names.OPERATING_MODE, mode)
+        one.set(names.OPERATING_MODE, mode if servo.mode is None else servo.mode)
         one.set(names.CURRENT_LIMIT, servo.current_limit_counts)
         made.append(one)
     return made

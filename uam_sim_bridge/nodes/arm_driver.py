@@ -15,6 +15,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Temperature
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import ALPHA, CHI_DOT
@@ -25,7 +26,7 @@ from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.convert import JointStateWriter, read_joint_command
+from uam_msgs_py.messages.convert import GRIPPER, JointStateWriter, read_joint_command
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
 from uam_msgs_py.node.base_node import UamNode, run
@@ -93,7 +94,13 @@ class ArmDriverNode(UamNode):
         self._bus = LateDevice(self, started, (ArmError, BusLost))
         self.failure = ""
         self._velocity = None  # (n,) [rad/s] desired
-        self._writer = JointStateWriter(self._names)
+        hand = [GRIPPER] if chain.gripper is not None else []
+        self._writer = JointStateWriter([*self._names, *hand])
+        if hand:
+            self._stroke = vehicle.gripper.opening
+            self._closes, self._open_to = False, self._stroke[1]
+            self.listen(topics.MAGNET, self._on_grip)
+            self.listen(topics.GRIPPER_COMMAND, self._on_opening, required=False)
         self._joints = self.publisher(topics.JOINTS)
         self._temperature = self.publisher(topics.ARM_TEMPERATURE)
         if self.driver.in_position_mode:
@@ -135,6 +142,14 @@ class ArmDriverNode(UamNode):
 
     def _on_goals(self, data: bytes) -> None:
         self.driver.command_position(read_joint_command(data, self._names))
+
+    def _on_grip(self, message: Bool) -> None:
+        self._closes = message.data
+        self.driver.command_gripper(self._stroke[0] if self._closes else self._open_to)
+
+    def _on_opening(self, message: Float64) -> None:
+        """Take the opening to which the fingers open from now on."""
+        self._open_to = min(max(message.data, self._stroke[0]), self._stroke[1])
 
     def _on_reference(self, data: bytes) -> None:
         reference = read_reference(data, len(self._names))[1]
@@ -191,9 +206,11 @@ class ArmDriverNode(UamNode):
     def _publish(self, reading: Reading, begun: float) -> None:
         age = round((time.monotonic() - reading.time) * SECOND)
         stamp = self.get_clock().now().nanoseconds - age
-        writer = self._writer
-        writer.position[:], writer.velocity[:] = reading.position, reading.velocity
-        writer.effort[:] = reading.effort
+        writer, n = self._writer, len(self._names)
+        writer.position[:n], writer.velocity[:n] = reading.position, reading.velocity
+        writer.effort[:n] = reading.effort
+        if len(writer.position) > n:
+            writer.position[n], writer.effort[n] = reading.grip
         self._joints.publish(writer.stamped(stamp))
         self.done_tick(stamp, begun)
 

@@ -20,7 +20,7 @@ from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.step import Stage
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_efforts, read_imu, read_joints, read_pose
+from uam_msgs_py.messages.convert import read_efforts, read_grip, read_imu, read_joints, read_pose
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_stamped
 from uam_msgs_py.node import wiring
@@ -145,10 +145,12 @@ class FusedTick:
     def _on_joints(self, data: bytes) -> None:
         """Take the joints. Without usable efforts the message is refused, its angles count."""
         readings, effort = read_joints(data, self._joints), np.full(len(self._joints), np.nan)
+        grip = read_grip(data)
         try:
             _, effort = read_efforts(data, self._joints)
         finally:
-            self._tick.tick(joints=(*readings, effort))
+            known = None if grip is None else (readings[0], grip)
+            self._tick.tick(joints=(*readings, effort), grip=known)
 
     def _on_payload(self, data: bytes) -> None:
         self._tick.tick(payload=read_pose(data))

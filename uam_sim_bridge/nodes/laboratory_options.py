@@ -26,7 +26,7 @@ from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.laboratory.laboratory import Devices
 from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
 
-GPIO, AUTOPILOT, NONE = "gpio", "autopilot", "none"
+GPIO, AUTOPILOT, SERVO, NONE = "gpio", "autopilot", "servo", "none"
 TOPIC = "topic"
 TCP, LINE, NATNET = "tcp", "line", "natnet"
 
@@ -52,7 +52,9 @@ class LaboratoryParameters(SimulatedParameters):
         "motive_y_up", "axes and bodies of the cameras", "name of config/mocap, or a file"
     )
     magnet: str = choice(
-        GPIO, "what switches the magnet: a GPIO line, or the autopilot", (GPIO, AUTOPILOT, NONE)
+        GPIO,
+        "what switches the magnet: a GPIO line, or the autopilot; servo: a gripper's, on the bus",
+        (GPIO, AUTOPILOT, SERVO, NONE),
     )
     magnet_line: str = text("magnet", "file that is the simulated GPIO line", "a file")
     active_low: bool = switch(False, "whether a low level of the line switches on")

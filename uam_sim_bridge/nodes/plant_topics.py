@@ -12,11 +12,18 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
 
 from uam_control.stamps import nanoseconds
-from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO, VehicleDescription
+from uam_control.vehicle import (
+    CURRENT_SERVO,
+    POSITION_SERVO,
+    TWO_FINGER,
+    VehicleDescription,
+)
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
+    GRIPPER,
     ImuWriter,
     JointStateWriter,
     PoseWriter,
@@ -78,7 +85,7 @@ class Sensors(Outlets):
         self._imu_writer = ImuWriter(body)
         self._mocap_writer = OdometryWriter(body) if odometry else PoseWriter()
         self._payload_writer = PoseWriter()
-        self._joint_writer = JointStateWriter(vehicle.joint_names)
+        self._joint_writer = JointStateWriter([*vehicle.joint_names, *_fingers(vehicle)])
         self._period = nanoseconds(vehicle.control_period)
 
     def clock(self, stamp: int) -> None:
@@ -101,7 +108,10 @@ class Sensors(Outlets):
         if samples.joints is not None:
             time, alpha, alpha_dot, torque = samples.joints
             writer = self._joint_writer
-            writer.position[:], writer.velocity[:], writer.effort[:] = alpha, alpha_dot, torque
+            n, grip = len(alpha), () if samples.grip is None else samples.grip[1]
+            writer.position[:n], writer.velocity[:n], writer.effort[:n] = alpha, alpha_dot, torque
+            if len(writer.position) > n:
+                writer.position[n], writer.effort[n] = grip
             self._joints.publish(writer.stamped(nanoseconds(time)))
         if samples.imu is None or not self._imu:
             return None
@@ -122,7 +132,7 @@ class TruthTopics(Outlets):
         self._state_writer = TrajectoryWriter(vehicle.coordinates)
         self._payload_writer = PoseWriter()
         self._rotor_writer = JointStateWriter(vehicle.rotor_names)
-        self._magnet_writer = JointStateWriter(["magnet", "swing"])
+        self._magnet_writer = JointStateWriter(["magnet", "swing", *_fingers(vehicle)])
 
     def publish(self, stamp: int, truth: Truth, motors: np.ndarray, magnet: bool) -> None:
         """Publish the truth at `stamp` [ns].
@@ -138,13 +148,20 @@ class TruthTopics(Outlets):
         rotors.effort[:] = truth.rotor_thrust
         self._rotors.publish(rotors.stamped(stamp))
         writer = self._magnet_writer
-        writer.position[:] = magnet, truth.magnet_swing
+        writer.position[:2] = magnet, truth.magnet_swing
         writer.effort[0] = truth.magnet_force
+        if len(writer.position) > 2:
+            writer.position[2], writer.effort[2] = truth.grip
         self._magnet.publish(writer.stamped(stamp))
 
     def publish_state(self, stamp: int, truth: Truth) -> None:
         """Publish the true state alone; `stamp` [ns]."""
         self._state.publish(self._state_writer.fill(stamp, truth.state))
+
+
+def _fingers(vehicle: VehicleDescription) -> tuple[str, ...]:
+    """Return the name of the fingers among joints, () without."""
+    return (GRIPPER,) if vehicle.gripper.kind == TWO_FINGER else ()
 
 
 class RecorderProgress:
@@ -206,6 +223,8 @@ class Answers:
         # NaN: no goal yet, the servos hold their position
         self.arm_command = np.full(len(self._names), np.nan if to_goals else 0.0)
         self.magnet = False
+        self._has_fingers = bool(_fingers(vehicle))
+        self.opening: float | None = None  # [m] to which fingers open, as last commanded
         self.forget_mission()
         self.setpoints: dict[int, int] = {}
         self.arrivals: dict[str, float] = {}  # time.monotonic() of the newest, by topic
@@ -225,6 +244,7 @@ class Answers:
                 (topics.ARM_EFFORT, partial(self._on_arm, topics.ARM_EFFORT), True),
                 (topics.ARM_GOALS, partial(self._on_arm, topics.ARM_GOALS), True),
                 (topics.MAGNET, self._on_magnet, True),
+                (topics.GRIPPER_COMMAND, self._on_gripper, False),
                 (topics.MISSION_STATUS, self._on_mission, False),
                 (topics.RESTARTS, self._on_restart, False),
             )
@@ -282,6 +302,10 @@ class Answers:
         self._arrived.add(MAGNET)
         self.magnet = read_switch(data)
         self.arrivals[topics.MAGNET.name] = time.monotonic()
+
+    def _on_gripper(self, message: Float64, info: dict | None = None) -> None:
+        if self._has_fingers:
+            self.opening = message.data
 
     def _on_restart(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.restarts += 1

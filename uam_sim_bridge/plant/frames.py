@@ -64,7 +64,8 @@ def end_effector(model: mujoco.MjModel, site: str) -> list[Frame]:
 
 def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:
     parent = model.body_parentid[body]
-    hinge, index = model.body_jntnum[body] > 0, model.body_jntadr[body]
+    index = model.body_jntadr[body]
+    hinge = index >= 0 and model.jnt_type[index] == mujoco.mjtJoint.mjJNT_HINGE
     return Frame(
         name=model.body(body).name,
         parent=BASE_LINK if parent == root else model.body(parent).name,

@@ -15,6 +15,7 @@ from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
 from uam_sim_bridge.plant.engine_step import error_text
+from uam_sim_bridge.plant.gripper import Fingers
 from uam_sim_bridge.plant.magnet import NO_MAGNET, magnet_constants
 from uam_sim_bridge.plant.observation import Observed, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
@@ -128,6 +129,8 @@ class MujocoPlant(Plant):
         self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
         self._alpha[:] = arm_start
         self._lay_out_magnet(-sum(arm_start))
+        self._fingers = Fingers(self.model, data, self.vehicle.numbers.get("gripper"))
+        self._fingers.pace(self.period)
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # moved far away: the model stays the same
             self._payload_position[:] = (5.0, 5.0, 0.02)
@@ -176,6 +179,8 @@ class MujocoPlant(Plant):
             payload_axes=self._payload_axes,
             gap_constants=self._magnet_constants,
             magnet_control=self._magnet_control,
+            finger_ends=self._fingers.ends,
+            finger_goal=self._fingers.goal,
             sensed_force=self._sensed_force,
             specific_force=self._specific_force,
         )
@@ -200,6 +205,8 @@ class MujocoPlant(Plant):
             payload=self._payload_pose,
             magnet_control=self._magnet_control,
             swing=self._swing_angle,
+            opening=self._fingers.opening,
+            grip_force=self._fingers.force,
         )
 
     def _prepare(self, gusty: bool) -> None:
@@ -214,7 +221,7 @@ class MujocoPlant(Plant):
         self.arrays = a = PlantArrays(
             *(self._physics_arrays(), self._observed_arrays(), self.truth_row),
             *(self._imu.noise.arrays, self._gust.arrays, self._mocap.arrays, self.effects.arrays),
-            np.zeros((max(late) + 1, 6 + 3 * self.joints)),
+            np.zeros((max(late) + 1, 8 + 3 * self.joints)),
             np.full(max(late) + 1, np.iinfo(np.int64).min),
             self.memory,
         )
@@ -236,7 +243,7 @@ class MujocoPlant(Plant):
             arm=(self.model.joint(first).dofadr[0], self.joints),
             torque_control=self._torque_control,
             encoder_units=self._encoders.units,
-            sample=np.empty(6 + 3 * self.joints),
+            sample=np.empty(8 + 3 * self.joints),
             pose=self._mocap.arrays.taken[VEHICLE_POSE],
         )
 
@@ -282,12 +289,14 @@ class MujocoPlant(Plant):
         tick, n, taken = self.tick, self.joints, self.tick - self.joints_late
         hil, joints = self.imu(tick), self._sample(taken)
         imu = self.imu(tick - self.imu_late) if self.imu_late else hil
+        grip = None
         if joints is not None:
-            parts = joints[6 : 6 + n], joints[6 + n : 6 + 2 * n], joints[6 + 2 * n :]
+            *parts, found = np.split(joints[6:], (n, 2 * n, 3 * n))
             joints = (taken * self.period, *parts)
+            grip = (joints[0], found) if len(self._fingers.opening) else None
         poses, payloads = map(self._mocap.arrived, (VEHICLE_POSE, PAYLOAD_POSE))
         payload = payloads[-1] if payloads else None
-        samples = Samples(imu, joints, None, hil, payload=payload)
+        samples = Samples(imu, joints, None, hil, payload=payload, grip=grip)
         samples.poses = poses
         return samples
 
@@ -328,6 +337,10 @@ class MujocoPlant(Plant):
         self._added_wind += change
         self._swing_rate = disturbance.payload_swing
 
+    def open_to(self, opening: float) -> None:
+        """See `Plant.open_to`."""
+        self._fingers.open_to(opening)
+
     def push(self, force: np.ndarray, torque: np.ndarray) -> None:
         """See `Plant.push`."""
         self._push[:3], self._push[3:] = force, torque
@@ -357,4 +370,5 @@ class MujocoPlant(Plant):
             float(row[at.magnet + 1]),
             self.rotors.speed.copy(),
             row[at.rotor_thrust : at.payload],
+            row[at.grip :],
         )

@@ -9,6 +9,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
+from uam_sim_bridge.plant.gripper import write_grip
 from uam_sim_bridge.plant.plant import TruthRow
 from uam_sim_bridge.plant.sensors import disturbed, quantised
 
@@ -21,7 +22,7 @@ class Observed(NamedTuple):
     [m/s^2, ENU] and angular [rad/s^2, FLU]. specific_force (3,) [m/s^2, FLU], imu_bias (6,):
     [rad/s, m/s^2]; servo_torque (n,) [N m]; encoder_units (2,): see `quantised`. rotor_thrust
     (rotors,) [N]; payload (7,): position [m] and quaternion; magnet_control (1,): part of the
-    holding force; swing (1,) [rad]: angle of the magnet's pivot.
+    holding force; swing (1,) [rad]: angle of the magnet's pivot. opening, grip_force: of `Fingers`.
     """
 
     position: np.ndarray
@@ -40,6 +41,8 @@ class Observed(NamedTuple):
     payload: np.ndarray
     magnet_control: np.ndarray
     swing: np.ndarray
+    opening: np.ndarray
+    grip_force: np.ndarray
 
 
 @jit
@@ -53,7 +56,7 @@ def observe(
 ) -> None:
     """Write the samples of IMU and joints, see `SensorArrays`, and the true values of a tick.
 
-    noise (6,): of the IMU; samples (6 + 3 n,); magnet_gain, at, truth: of `write_truth`.
+    noise (6,): of the IMU; samples (8 + 3 n,); magnet_gain, at, truth: of `write_truth`.
     """
     joints = len(o.alpha)
     angles, speeds, torques = 6, 6 + joints, 6 + 2 * joints
@@ -63,6 +66,7 @@ def observe(
     )
     for i in range(joints):
         samples[torques + i] = o.servo_torque[i]
+    write_grip(o.opening, o.grip_force, samples[torques + joints :])
     write_truth(o, magnet_gain, at, truth)
 
 
@@ -77,6 +81,7 @@ def write_truth(o: Observed, magnet_gain: float, at: TruthRow, row: np.ndarray) 
         row[at.payload + i] = o.payload[i]
     row[at.magnet] = o.magnet_control[0] * magnet_gain
     row[at.magnet + 1] = o.swing[0]
+    write_grip(o.opening, o.grip_force, row[at.grip :])
 
 
 @jit

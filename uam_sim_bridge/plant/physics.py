@@ -8,6 +8,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_sim_bridge.plant.actuators import joint_step, receive, rotor_step
+from uam_sim_bridge.plant.gripper import move_fingers
 from uam_sim_bridge.plant.magnet import pull_fraction
 
 
@@ -18,6 +19,7 @@ class PhysicsArrays(NamedTuple):
     servo_command to torque_control: see `joint_step`. drag (3,) [N s/m]; velocity (3,) [m/s], force
     (3,) [N] on the base, ENU; wind, wind_mean (3,) [m/s], gust_keep (1,): see `blow`.
     face, payload, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1.
+    finger_ends, finger_goal: see `move_fingers`.
     sensed_force (3,) [m/s^2, FLU]: specific force of a physics step, specific_force: the mean.
     """
 
@@ -46,6 +48,8 @@ class PhysicsArrays(NamedTuple):
     payload_axes: np.ndarray
     gap_constants: np.ndarray
     magnet_control: np.ndarray
+    finger_ends: np.ndarray
+    finger_goal: np.ndarray
     sensed_force: np.ndarray
     specific_force: np.ndarray
 
@@ -54,7 +58,7 @@ class PhysicsArrays(NamedTuple):
 def begin_period(
     a: PhysicsArrays, arm_command: np.ndarray, magnet: bool, gust: np.ndarray, tick: int
 ) -> None:
-    """Write the loads of control period `tick`: drag -c (v - wind), pull of the magnet.
+    """Write the loads of control period `tick`: drag -c (v - wind), pull of the magnet, fingers.
 
     arm_command (n,): sent now, see `receive`; gust (3,): see `blow`. Sets the specific force to 0,
     for the mean over the physics steps.
@@ -66,6 +70,7 @@ def begin_period(
         a.specific_force[i] = 0.0
     pull = pull_fraction(a.face, a.payload, a.payload_axes, a.gap_constants) if magnet else 0.0
     a.magnet_control[0] = pull
+    move_fingers(a.finger_ends, a.finger_goal, magnet)
 
 
 @jit

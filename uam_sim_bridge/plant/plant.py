@@ -13,6 +13,7 @@ the simulator calls
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +40,8 @@ class Samples:
     joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
     position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
     the autopilot's own sensors. imu_copies: messages with this IMU sample. payload: as mocap, of
-    the payload's grip point, the middle of its upper side. earlier: poses that arrive at the same
+    the payload's grip point, the middle of its upper side. grip: (stamp, (2,)): opening [m] and
+    closing force [N] of a two-finger gripper. earlier: poses that arrive at the same
     tick as mocap, in order, exposed before it.
     """
 
@@ -49,6 +51,7 @@ class Samples:
     hil: tuple
     imu_copies: int = 1
     payload: tuple | None = None
+    grip: tuple | None = None
     earlier: Sequence[tuple] = ()
 
     @property
@@ -77,7 +80,7 @@ class Truth:
 
     state (3, 6 + n): as in uam_control.coordinates; quaternion, payload_quaternion (4,) [w x y z],
     FLU → ENU; payload_position (3,) [m]; magnet_force [N]; magnet_swing [rad]; rotor_speed
-    (rotors,) [rad/s]; rotor_thrust (rotors,) [N].
+    (rotors,) [rad/s]; rotor_thrust (rotors,) [N]; grip: opening [m] and force [N] of fingers.
     """
 
     state: np.ndarray
@@ -88,18 +91,20 @@ class Truth:
     magnet_swing: float
     rotor_speed: np.ndarray
     rotor_thrust: np.ndarray
+    grip: Sequence[float] = (math.nan, math.nan)
 
 
 class TruthRow(NamedTuple):
     """Where the true values of one tick begin in a flat row (width,) of float64; see `Truth`.
 
-    state: row by row; rotor_thrust; payload: position and quaternion; magnet: force, swing.
+    state: row by row; rotor_thrust; payload: position and quaternion; magnet: force, swing; grip.
     """
 
     state: int
     rotor_thrust: int
     payload: int
     magnet: int
+    grip: int
     width: int
 
     @classmethod
@@ -107,7 +112,7 @@ class TruthRow(NamedTuple):
         """Return the places for a vehicle."""
         thrust = 3 * (ALPHA + len(vehicle.joints))
         payload = thrust + len(vehicle.rotors)
-        return cls(0, thrust, payload, payload + 7, payload + 9)
+        return cls(0, thrust, payload, payload + 7, payload + 9, payload + 11)
 
     def write(self, truth: Truth, row: np.ndarray) -> None:
         """Write the values of `truth` to row (width,)."""
@@ -115,7 +120,8 @@ class TruthRow(NamedTuple):
         row[self.rotor_thrust : self.payload] = truth.rotor_thrust
         row[self.payload : self.payload + 3] = truth.payload_position
         row[self.payload + 3 : self.magnet] = truth.payload_quaternion
-        row[self.magnet : self.width] = truth.magnet_force, truth.magnet_swing
+        row[self.magnet : self.grip] = truth.magnet_force, truth.magnet_swing
+        row[self.grip : self.width] = truth.grip
 
 
 @dataclass
@@ -197,6 +203,10 @@ class Plant(ABC):
 
     def disturb(self, disturbance: Disturbance) -> None:
         """Apply `disturbance` until the next call."""
+        raise NotImplementedError
+
+    def open_to(self, opening: float) -> None:
+        """Let fingers, when they open, open to `opening` [m]."""
         raise NotImplementedError
 
     def push(self, force: np.ndarray, torque: np.ndarray) -> None:

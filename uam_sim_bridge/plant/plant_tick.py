@@ -27,8 +27,8 @@ from uam_sim_bridge.plant.sensors import (
 
 
 class PlantArrays(NamedTuple):
-    """State of a `MujocoPlant`. samples (m, 6 + 3 n): of IMU and joints, in a ring by the tick at
-    which they were taken, taken (m,); numbers (1,): see WHOLE, REAL."""
+    """State of a `MujocoPlant`. samples (m, 8 + 3 n): of IMU, joints and gripper, in a ring by the
+    tick at which they were taken, taken (m,); numbers (1,): see WHOLE, REAL."""
 
     physics: PhysicsArrays
     observed: Observed

@@ -103,9 +103,11 @@ def _joint(
 ) -> None:
     hinge = model.body_jntnum[body] > 0
     index = model.body_jntadr[body]
+    slides = hinge and model.jnt_type[index] == mujoco.mjtJoint.mjJNT_SLIDE
     name = model.joint(index).name if hinge else f"{model.body(body).name}_mount"
     limited = hinge and bool(model.jnt_limited[index])
     kind = "fixed" if not hinge else "revolute" if limited else "continuous"
+    kind = "prismatic" if slides else kind
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     ElementTree.SubElement(
         joint,

@@ -18,12 +18,15 @@ import numpy as np
 from uam_control.mission.scenarios.environment import ENVIRONMENT, default_environment
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
+    TWO_FINGER,
     Joint,
     VehicleDescription,
     VehicleError,
     load_description,
+    model_spec,
 )
 from uam_sim_bridge.plant.arm_geometry import BASE, FACE, MAGNET, SWING
+from uam_sim_bridge.plant.gripper import FINGERS, add_drive
 from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
@@ -79,7 +82,7 @@ class Vehicle:
         contradicts the description.
         """
         described = self.description
-        spec = self._of_mujoco(lambda: mujoco.MjSpec.from_file(str(described.model)))
+        spec = self._of_mujoco(lambda: model_spec(described))
         self._check_parts(spec)
         spec.option.gravity = (0.0, 0.0, -described.gravity)
         self._add_rotors(spec)
@@ -118,7 +121,8 @@ class Vehicle:
             missing = [name for name in required if name not in there]
             if missing:
                 raise VehicleError(f"{described.model}: no {kind} '{missing[0]}'")
-        strange = sorted(joints - {BASE, PAYLOAD, *swing, *described.joint_names})
+        moved = FINGERS if described.gripper.kind == TWO_FINGER else swing
+        strange = sorted(joints - {BASE, PAYLOAD, *moved, *described.joint_names})
         if strange:
             raise VehicleError(
                 f"{described.model}: joint '{strange[0]}' is not in {described.file.name}, "
@@ -167,6 +171,8 @@ class Vehicle:
         for name in described.joint_names:
             motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             motor.set_to_motor()
+        if described.gripper.kind == TWO_FINGER:
+            add_drive(spec, self.numbers["gripper"])
         if not described.has_magnet:
             return
         magnet = spec.add_actuator(

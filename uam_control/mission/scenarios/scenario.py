@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import CHI, Z, coordinates
+from uam_control.grasp.windows import Approach
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
 from uam_control.mission.scenarios.route import PAUSE, SINK, TRAJECTORY, Leg, Route
@@ -80,7 +81,8 @@ class Scenario:
     Times are mission times [s]. arm_start: joint angles at take-off [rad]; payload_mass [kg];
     drop_point: x, y [m]; phases, magnet, snapshots: (begin, value). route: without route_at it is
     the whole flight, see `route`; with it, its motion is added to that of the moves from then on.
-    grip: what the magnet does along a route that is the whole flight.
+    grip: what the gripper does along a route that is the whole flight; approaches: (time of a grip,
+    how the tool comes to the payload) where it is not from above.
     notes: for the user, about the file. environment: what stands around in simulation, see
     `environment`; (): the usual.
     """
@@ -101,6 +103,7 @@ class Scenario:
     notes: tuple[str, ...] = ()
     environment: tuple[dict[str, Any], ...] = ()
     grip: Grip | None = None
+    approaches: tuple[tuple[float, Approach], ...] = ()
 
     @property
     def surroundings(self) -> dict[str, Any]:
@@ -164,6 +167,7 @@ class Scenario:
             route=route,
             route_at=None if self.route_at is None else factor * self.route_at,
             magnet=later(self.magnet),
+            approaches=later(self.approaches),
             snapshots=later(self.snapshots),
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from uam_control.coordinates import BASE_COORDINATES, arm_coordinates
+from uam_control.grasp.windows import Approach
 from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios import hand_kind
 from uam_control.mission.scenarios.csv_file import from_csv
@@ -32,14 +33,14 @@ from uam_control.mission.scenarios.scenario_options import (
 )
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import NO_GRIPPER, VehicleDescription, load_description
 
 T = TypeVar("T")
 SHORTEST = 1e-3  # [s] of a move or of the landing
 
 KEYS = (
-    *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "payload"),
-    *("landing", "snapshots", "faults", ENVIRONMENT),
+    *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "gripper"),
+    *("payload", "landing", "snapshots", "faults", ENVIRONMENT),
 )
 
 
@@ -62,8 +63,10 @@ def load_scenario(
         raise ScenarioError(f"{file}: a name that ends in {', '.join(FORMS)} expected")
     scenario = read(file, vehicle, options).slowed(options.slowdown)
     check_length(scenario.landing.end, f"{file}: the flight")
-    if any(on for _, on in scenario.magnet) and not vehicle.has_magnet:
-        raise ScenarioError(f"{file}: magnet: {vehicle.name} has none; allowed: a scenario without")
+    if any(on for _, on in scenario.magnet) and vehicle.gripper.kind == NO_GRIPPER:
+        raise ScenarioError(
+            f"{file}: magnet: {vehicle.name} has no gripper; allowed: a scenario without"
+        )
     return scenario
 
 
@@ -101,7 +104,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
         phases=phases or ((0.0, "flight"),),
         landing=landing,
         moves=_moves(top, vehicle, landing),
-        magnet=_timeline(top, "magnet", "at", "energised", Section.switch),
+        **_grips(top),
         payload_mass=payload.not_negative("mass") if payload else 0.0,
         drop_point=(
             payload.numbers("drop_point", 2) if payload and "drop_point" in payload.values else None
@@ -217,20 +220,49 @@ def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescriptio
     return angle
 
 
+def _grips(top: Section) -> dict[str, tuple]:
+    """Return when the gripper closes (True) and opens, and how it comes to the payload.
+
+    In the list `gripper`, or `magnet` of a magnet.
+    """
+    key, word = ("gripper", "closed") if "gripper" in top.values else ("magnet", "energised")
+    if key == "gripper" and "magnet" in top.values:
+        raise top.error(key, "not together with magnet, which says the same")
+    how = Approach._fields
+    switches = _timeline(top, key, "at", word, Section.switch, how)
+    entries = zip(switches, top.entries(key, True), strict=True)
+    given = ((at, _approach(entry)) for (at, _), entry in entries if entry.values.keys() & set(how))
+    return {"magnet": switches, "approaches": tuple(given)}
+
+
+def _approach(entry: Section) -> Approach:
+    usual = Approach()
+    way = np.array(entry.numbers("direction", 3, default=usual.direction))
+    if not way.any():
+        raise entry.error("direction", "[0, 0, 0]: the way of the tool to the payload, x y z")
+    point = entry.numbers("point", 3, default=usual.point)
+    return Approach(tuple((way / np.linalg.norm(way)).tolist()), point)
+
+
 def _description(top: Section) -> str:
     return top.text("description", default="")
 
 
 def _timeline(
-    top: Section, key: str, time: str, name: str, value: Callable[[Section, str], T]
+    top: Section,
+    key: str,
+    time: str,
+    name: str,
+    value: Callable[[Section, str], T],
+    further: Sequence[str] = (),
 ) -> tuple[tuple[float, T], ...]:
     """Return the entries of the list `key` as (time [s], value); the times must increase.
 
-    time, name: of the two entries of each; value: reads the second.
+    time, name: of the two entries of each; value: reads the second; further: names of others.
     """
     found: list[tuple[float, T]] = []
     for entry in top.entries(key, True):
-        entry.only((time, name))
+        entry.only((time, name, *further))
         at = entry.not_negative(time)
         if found and at <= found[-1][0]:
             raise entry.error(time, f"{at:g} s is not after the entry before, {found[-1][0]:g} s")

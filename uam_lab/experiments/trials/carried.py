@@ -26,25 +26,30 @@ FOLDERS = ("meshdir", "texturedir", "assetdir")  # of MuJoCo's element `compiler
 @dataclass(frozen=True)
 class Carried:
     """scenario: as it was read, None for one of config/. model: the MJCF file, relative to config/,
-    or to `files` if there are any; files: content by relative path."""
+    or to `files` if there are any; files: content by relative path; gripper: its MJCF file, as
+    model, "" without."""
 
     scenario: Scenario | None
     model: str
     files: dict[str, bytes] = field(default_factory=dict)
+    gripper: str = ""
 
 
 def carried(scenario: str, profile: Profile) -> Carried:
     """Return what flights of this scenario (name or file) with this profile need."""
-    model, files = _model(profile.vehicle.model)
-    if Path(scenario).suffix.lower() not in (".yaml", ".csv"):
-        return Carried(None, model, files)
-    return Carried(_scenario(scenario, profile.vehicle.source), model, files)
+    (model, *gripper), files = _models(profile.vehicle.models)
+    own = Path(scenario).suffix.lower() in (".yaml", ".csv")
+    read = _scenario(scenario, profile.vehicle.source) if own else None
+    return Carried(read, model, files, *gripper)
 
 
 def arrived(given: Carried, profile: Profile) -> Profile:
     """Return the profile with the vehicle's model where it is in this process."""
     folder = _unpacked(tuple(sorted(given.files.items()))) if given.files else configuration.root()
     vehicle: VehicleDescription = replace(profile.vehicle, model=folder / given.model)
+    if given.gripper:
+        there = vehicle.numbers["gripper"] | {"model": str(folder / given.gripper)}
+        vehicle = replace(vehicle, numbers=vehicle.numbers | {"gripper": there})
     return replace(profile, vehicle=vehicle)
 
 
@@ -56,15 +61,14 @@ def _scenario(scenario: str, vehicle: str) -> Scenario:
 
 
 @lru_cache(maxsize=64)
-def _model(model: Path) -> tuple[str, dict[str, bytes]]:
-    model = model.resolve()
-    root = configuration.root().resolve()
-    if model.is_relative_to(root):
-        return model.relative_to(root).as_posix(), {}
-    files = files_of_model(model)
-    top = Path(os.path.commonpath([file.parent for file in files]))
-    content = {file.relative_to(top).as_posix(): file.read_bytes() for file in files}
-    return model.relative_to(top).as_posix(), content
+def _models(given: tuple[Path, ...]) -> tuple[tuple[str, ...], dict[str, bytes]]:
+    models, content = [model.resolve() for model in given], {}
+    top = configuration.root().resolve()
+    if not all(model.is_relative_to(top) for model in models):
+        files = {file for model in models for file in files_of_model(model)}
+        top = Path(os.path.commonpath([file.parent for file in files]))
+        content = {file.relative_to(top).as_posix(): file.read_bytes() for file in files}
+    return tuple(model.relative_to(top).as_posix() for model in models), content
 
 
 def files_of_model(model: Path) -> list[Path]:

@@ -26,7 +26,9 @@ def inputs(
         **further,
         "vehicle": vehicle.numbers,
         "autopilot gains": vehicle.autopilot_gains,
-        "model (MJCF and its files)": _content(files_of_model(vehicle.model)),
+        "model (MJCF and its files)": _content(
+            file for model in vehicle.models for file in files_of_model(model)
+        ),
         "scenario": _content([configuration.named("scenarios", scenario)]),
         "laws": _content(laws),
         **identity(),

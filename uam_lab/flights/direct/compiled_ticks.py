@@ -28,7 +28,7 @@ from uam_control.maths.memory import put
 from uam_control.stages.bridge_stage import BridgeStage, unreported
 from uam_control.stages.control_tick import ControlTick, take_report
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.signals import IMU, JOINTS, NOTHING, PAYLOAD, POSES, SignalArrays
+from uam_control.stages.signals import GRIP, IMU, JOINTS, NOTHING, PAYLOAD, POSES, SignalArrays
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
 from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
@@ -307,6 +307,10 @@ def sense_step(arrays: tuple) -> int:
     s.stamps[JOINTS] = stamp_of(taken * m.period)
     for i in range(3):
         put(plant.samples[taken % len(plant.samples)][6 + i * n :], s.joints[i])
+    s.stamps[GRIP] = NOTHING
+    if len(plant.observed.opening):
+        s.stamps[GRIP] = s.stamps[JOINTS]
+        put(plant.samples[taken % len(plant.samples)][6 + 3 * n :], s.grip)
     taken = m.tick - m.imu_late
     s.stamps[IMU] = stamp_of(taken * m.period)
     put_imu(plant.samples[taken % len(plant.samples)], s.imu)

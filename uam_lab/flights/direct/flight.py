@@ -203,9 +203,9 @@ class DirectFlight:
                 check_arrays(sample[1:])
         known, payload = self._complete, samples.payload
         signals.poses = [_stamped(pose) for pose in poses] if known else ()
-        signals.joints, signals.imu, signals.payload = (
+        signals.joints, signals.imu, signals.payload, signals.grip = (
             _stamped(sample) if known and sample is not None else None
-            for sample in (joints, imu, payload)
+            for sample in (joints, imu, payload, samples.grip)
         )
 
     def _update_faults(self, control: ControlTick) -> bool:

@@ -40,6 +40,7 @@ class Places(NamedTuple):
     thrust: int
     payload: int
     magnet: int
+    grip: int  # -1: not recorded
 
     @classmethod
     def of(cls, columns: Columns) -> Places:
@@ -52,6 +53,7 @@ class Places(NamedTuple):
             columns["rotor_1.thrust"],
             columns.block("payload.").start,
             columns["magnet.on"],
+            columns["gripper.opening"] if "gripper.opening" in columns else -1,
         )
 
 
@@ -245,3 +247,6 @@ def write_truth(row: np.ndarray, kept: np.ndarray, rotors: int, layout: RowLayou
     row[at.magnet] = kept[MAGNET]
     row[at.magnet + 1] = kept[begin + of.magnet]
     row[at.magnet + 2] = kept[begin + of.magnet + 1]
+    if at.grip >= 0:
+        row[at.grip] = kept[begin + of.grip]
+        row[at.grip + 1] = kept[begin + of.grip + 1]

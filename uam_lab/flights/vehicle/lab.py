@@ -15,8 +15,9 @@ from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 
 AUTOPILOT, TOPIC, GPIO = "autopilot", "topic", "gpio"
+SERVO = "servo"  # a gripper's, on the arm's bus
 IMUS = (AUTOPILOT, TOPIC)
-THROUGH = (GPIO, AUTOPILOT, NONE)
+THROUGH = (GPIO, AUTOPILOT, SERVO, NONE)
 OUT = Path("flights")
 
 

@@ -183,7 +183,7 @@ def _magnet(top: Section) -> Magnet:
         sets["line"] = LineParameters
     elif through == AUTOPILOT:
         sets["output"] = AutopilotMagnetParameters
-    if through != NONE:
+    if through in (GPIO, AUTOPILOT):
         sets["switching"] = SwitchingParameters
     section.only(["through", *(name for kind in sets.values() for name in kind.specs())])
     found = {

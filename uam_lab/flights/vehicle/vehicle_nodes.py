@@ -10,7 +10,7 @@ from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import ONLOOKERS
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros import node_arguments
-from uam_lab.flights.vehicle.lab import AUTOPILOT, GPIO, Lab
+from uam_lab.flights.vehicle.lab import AUTOPILOT, GPIO, SERVO, Lab
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
@@ -125,6 +125,8 @@ def wires(lab: Lab) -> list[wiring.Wire]:
     subscribers = {commands.name: wiring.ARM_DRIVER}
     if lab.magnet.through == GPIO:
         subscribers[topics.MAGNET.name] = wiring.MAGNET_DRIVER
+    elif lab.magnet.through == SERVO:
+        subscribers[topics.MAGNET.name] = wiring.ARM_DRIVER
     elif lab.magnet.through == AUTOPILOT:
         subscribers[topics.MAGNET.name] = wiring.BRIDGE
     return wiring.on_vehicle(sources(lab), subscribers)

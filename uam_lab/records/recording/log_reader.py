@@ -287,8 +287,11 @@ def _truth(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     position = log.samples(topics.TRUTH_PAYLOAD, ("position",), 3).at(ticks)
     x, y, z, w = log.samples(topics.TRUTH_PAYLOAD, ("orientation",), 4).at(ticks).T
     values[:, columns.block("payload.")] = np.column_stack([position, w, x, y, z])
-    magnet = log.samples(topics.TRUTH_MAGNET, ("position", "effort"), 2).at(ticks)
-    values[:, columns.block("magnet.")] = magnet[:, [0, 2, 1]]
+    fingers = "gripper.opening" in columns
+    magnet = log.samples(topics.TRUTH_MAGNET, ("position", "effort"), 2 + fingers).at(ticks)
+    values[:, columns.block("magnet.")] = magnet[:, [0, 2 + fingers, 1]]
+    if fingers:
+        values[:, columns.block("gripper.")] = magnet[:, [2, 5]]
 
 
 def _measured(

@@ -28,7 +28,7 @@ from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.motion.flyer import Flyer
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import TWO_FINGER, VehicleDescription
 from uam_lab.records.results import hand_columns
 from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.hand_columns import TRUTH
@@ -41,8 +41,9 @@ PHASE_COLUMN = "phase"
 METADATA_KEY = b"uam"
 
 
-def _declare(joints: int, rotors: int, hand: bool) -> dict[str, str]:
-    """Return all numeric columns in file order: name → unit; hand: those of an end effector."""
+def _declare(joints: int, rotors: int, hand: bool, fingers: bool) -> dict[str, str]:
+    """Return all numeric columns in file order: name → unit; hand, fingers: those of an end
+    effector and of a two-finger gripper."""
     names = coordinates(joints)
     units = {name: "m" if name in names[POSITION] else "rad" for name in names}
     columns = {"time": "s"}
@@ -65,6 +66,8 @@ def _declare(joints: int, rotors: int, hand: bool) -> dict[str, str]:
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
     columns |= {f"payload.q{axis}": "1" for axis in "wxyz"}
     columns |= {"magnet.on": "1", "magnet.force": "N", "magnet.swing": "rad"}
+    if fingers:
+        columns |= {"gripper.opening": "m", "gripper.force": "N"}
     return columns | hand_columns.declared() if hand else columns
 
 
@@ -116,16 +119,22 @@ class Columns:
         return f"{name} [{self.units[name]}]"
 
 
+def columns(joints: int, rotors: int, hand: bool = False, fingers: bool = False) -> Columns:
+    """Return the columns of a vehicle with so many joints and rotors; hand: an end effector;
+    fingers: a two-finger gripper."""
+    return _made(joints, rotors, hand, fingers)
+
+
 @cache
-def columns(joints: int, rotors: int, hand: bool = False) -> Columns:
-    """Return the columns of a vehicle with so many joints and rotors; hand: an end effector."""
-    return Columns(_declare(joints, rotors, hand))
+def _made(*vehicle: int) -> Columns:
+    return Columns(_declare(*vehicle))
 
 
 def columns_of(vehicle: VehicleDescription) -> Columns:
     """Return the columns of a vehicle."""
     hand = Flyer.with_hand(vehicle) is not None
-    return columns(len(vehicle.joints), len(vehicle.rotors), hand)
+    fingers = vehicle.gripper.kind == TWO_FINGER
+    return columns(len(vehicle.joints), len(vehicle.rotors), hand, fingers)
 
 
 def gain_columns(subsystem: str, names: Iterable[str], found: Columns) -> np.ndarray:
@@ -320,7 +329,8 @@ def _layout(present: Iterable[str]) -> Columns:
     """Return the columns of a file whose columns are called `present`."""
     joints = sum(label.startswith("error.alpha_") for label in present)
     rotors = sum(label.startswith("rotor_") and ".thrust" in label for label in present)
-    return columns(joints, rotors, any(one.startswith(f"{TRUTH}.") for one in present))
+    hand = any(one.startswith(f"{TRUTH}.") for one in present)
+    return columns(joints, rotors, hand, any(one.startswith("gripper.") for one in present))
 
 
 def _missing(present: Iterable[str], columns: Columns) -> list[str]:

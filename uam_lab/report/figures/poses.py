@@ -9,6 +9,7 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_lab.records.results.timeseries import Series
+from uam_sim_bridge.plant.gripper import FINGERS
 from uam_sim_bridge.plant.surroundings import PAYLOAD, PLACE
 from uam_sim_bridge.plant.vehicle import BASE, ENVIRONMENT, SWING, Vehicle
 
@@ -32,6 +33,8 @@ class Poses:
         self._arm = joint(self.vehicle.description.joint_names[0]).qposadr[0]
         magnet = self.vehicle.description.has_magnet
         self._swing = joint(SWING).qposadr[0] if magnet else None
+        hand = FINGERS if "gripper.opening" in series.columns else ()
+        self._fingers = [joint(name).qposadr[0] for name in hand]
 
     def put(self, row: int) -> None:
         """Set the model to the pose in `row` of the series."""
@@ -42,6 +45,8 @@ class Poses:
         qpos[self._arm : self._arm + columns.joints] = chi[ARM]
         if self._swing is not None:
             qpos[self._swing] = np.nan_to_num(values[columns["magnet.swing"]])
+        if self._fingers:
+            qpos[self._fingers] = 0.5 * np.nan_to_num(values[columns["gripper.opening"]])
         payload = values[columns.block("payload.")]
         if not self.has_payload or np.isnan(payload).any():
             payload = (*OUT_OF_SIGHT, 1.0, 0.0, 0.0, 0.0)

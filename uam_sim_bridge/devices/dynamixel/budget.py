@@ -28,6 +28,10 @@ class Item:
         return BITS_PER_BYTE * (self.sent + self.received) / baud_rate + self.waits
 
 
+# place and length of the goal, id, goal position
+GRIPPER_GOAL = Item("Sync Write, goal of the gripper", INSTRUCTION + 2 + 2 + 1 + 4, 0, 0.0)
+
+
 @dataclass(frozen=True)
 class Budget:
     """The parts of a cycle at a baud rate; `slow_every`: cycles per slow read."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
@@ -17,7 +18,8 @@ from uam_sim_bridge.devices.dynamixel.control_table import (
 )
 
 DEFAULT_HARDWARE = "s500_lab"  # in config/lab
-CHAIN = ("device", "baud_rate", "return_delay_us", "servos")
+CHAIN = ("device", "baud_rate", "return_delay_us", "servos", "gripper")
+GRIPPER = "gripper"  # name of its servo beside those of the joints
 SERVO = (
     *("joint", "id", "model", "direction", "zero", "gear", "current_limit", "torque_scale"),
     *("coulomb", "viscous", "range_deg", "torque_per_current", "current_unit"),
@@ -41,7 +43,8 @@ class ServoDescription:
     direction: 1 or -1; zero [counts]: position at angle 0; gear: turns of the servo per turn of the
     joint; torque_constant [N m/A] at the joint; current_unit, current_limit [A]; low, high [rad];
     stowed [rad]; coulomb [N m], viscous [N m s/rad]: friction at the joint; torque_scale: factor
-    that torque_constant contains.
+    that torque_constant contains. mode: its own Operating Mode, None: that of the vehicle's servos;
+    speed [rad/s]: of its own profile in a position mode, 0: none.
     """
 
     joint: str
@@ -59,6 +62,8 @@ class ServoDescription:
     coulomb: float
     viscous: float
     torque_scale: float
+    mode: int | None = None
+    speed: float = 0.0
 
     @property
     def label(self) -> str:
@@ -107,12 +112,26 @@ class ServoDescription:
 
 @dataclass(frozen=True)
 class ArmChain:
-    """The chain: serial device, baud rate, return delay [s] of every servo, servos base to tip."""
+    """The chain: serial device, baud rate, return delay [s] of every servo, servos base to tip.
+
+    The last one may be a gripper's. Its angle is the opening / transmission [m/rad].
+    """
 
     device: str
     baud_rate: int
     return_delay: float
     servos: tuple[ServoDescription, ...]
+    transmission: float = 0.0
+
+    @property
+    def arm(self) -> tuple[ServoDescription, ...]:
+        """The servos of the joints."""
+        return tuple(servo for servo in self.servos if servo.joint != GRIPPER)
+
+    @property
+    def gripper(self) -> ServoDescription | None:
+        """The servo of the gripper, None without."""
+        return next((servo for servo in self.servos if servo.joint == GRIPPER), None)
 
     @property
     def ids(self) -> tuple[int, ...]:
@@ -122,7 +141,7 @@ class ArmChain:
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, base to tip."""
-        return tuple(servo.joint for servo in self.servos)
+        return tuple(servo.joint for servo in self.arm)
 
     @property
     def return_delay_counts(self) -> int:
@@ -172,24 +191,69 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     if delay % 2:
         raise arm.error("return_delay_us", f"{delay} is odd; the servos' unit is 2 us")
     servos = tuple(_servo(entries[name], i, vehicle) for i, name in enumerate(joints))
+    numbers = vehicle.numbers.get(GRIPPER)
+    if (numbers is None) is arm.has(GRIPPER):
+        text = "missing; the vehicle has one" if numbers else "the vehicle has none on the bus"
+        raise arm.error(GRIPPER, text)
+    if numbers is not None:
+        servos = (*servos, _gripper_servo(arm.section(GRIPPER), numbers))
     ids = [servo.id for servo in servos]
     if len(set(ids)) < len(ids):
         raise arm.error("servos", f"ids {', '.join(map(str, ids))}: each servo needs its own")
-    return ArmChain(arm.text("device"), int(speed), 1e-6 * delay, servos)
+    transmission = 0.0 if numbers is None else numbers["transmission"]
+    return ArmChain(arm.text("device"), int(speed), 1e-6 * delay, servos, transmission)
 
 
-def _servo(entry: Section, number: int, vehicle: VehicleDescription) -> ServoDescription:
-    joint = vehicle.joints[number]
-    entry.only(SERVO)
+def _table(entry: Section) -> ControlTable:
     try:
         table = control_table(entry.text("model"))
         for name in (names.GOAL_CURRENT, names.PRESENT_CURRENT, names.BUS_WATCHDOG):
             table[name]
     except ControlTableError as error:
         raise entry.error("model", str(error)) from None
+    return table
+
+
+def _direction(entry: Section) -> int:
     direction = _whole(entry, "direction", -1, 1)
     if direction == 0:
         raise entry.error("direction", "0 is not one of 1, -1")
+    return direction
+
+
+def _gripper_servo(entry: Section, numbers: dict[str, Any]) -> ServoDescription:
+    """Return the servo of a gripper with the `numbers` of the vehicle: goal positions, limited by
+    the current that gives its force."""
+    entry.only(("id", "model", "direction", "zero"))
+    table, lever = _table(entry), numbers["transmission"]
+    closed, opened = (opening / lever for opening in numbers["opening"])
+    constant, unit = numbers["torque_per_current"], numbers["current_unit"]
+    _check_unit(entry, table, unit)
+    return ServoDescription(
+        joint=GRIPPER,
+        id=_whole(entry, "id", 0, LAST_ID),
+        table=table,
+        direction=_direction(entry),
+        zero=_whole(entry, "zero", -table.counts_per_turn, 2 * table.counts_per_turn),
+        gear=1.0,
+        torque_constant=constant,
+        current_unit=unit,
+        current_limit=numbers["force"] * lever / constant,
+        low=closed,
+        high=opened,
+        stowed=opened,
+        coulomb=0.0,
+        viscous=0.0,
+        torque_scale=1.0,
+        mode=names.CURRENT_POSITION_MODE,
+        speed=numbers["speed"] / lever,
+    )
+
+
+def _servo(entry: Section, number: int, vehicle: VehicleDescription) -> ServoDescription:
+    joint = vehicle.joints[number]
+    entry.only(SERVO)
+    table, direction = _table(entry), _direction(entry)
     motor = Section(vehicle.servo_numbers(number) | entry.values, entry.where, ArmError)
     unit, gear = motor.positive("current_unit"), entry.positive("gear")
     _check_unit(entry, table, unit)

@@ -27,7 +27,7 @@ STATUS_LEVEL, POSITION_P_GAIN, PWM_LIMIT = "Status Return Level", "Position P Ga
 BUS_WATCHDOG, GOAL_CURRENT, GOAL_POSITION = "Bus Watchdog", "Goal Current", "Goal Position"
 PRESENT_CURRENT, PRESENT_VELOCITY = "Present Current", "Present Velocity"
 PRESENT_POSITION, PRESENT_VOLTAGE = "Present Position", "Present Input Voltage"
-PRESENT_TEMPERATURE = "Present Temperature"
+PRESENT_TEMPERATURE, PROFILE_VELOCITY = "Present Temperature", "Profile Velocity"
 
 # Operating Mode, ROBOTIS e-manual
 CURRENT_MODE, POSITION_MODE, CURRENT_POSITION_MODE = 0, 3, 5

@@ -14,16 +14,21 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel import latency_timer, startup
-from uam_sim_bridge.devices.dynamixel.budget import Budget, budget
+from uam_sim_bridge.devices.dynamixel.budget import GRIPPER_GOAL, Budget, budget
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
-from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, ServoDescription
+from uam_sim_bridge.devices.dynamixel.chain import (
+    GRIPPER,
+    ArmChain,
+    ArmError,
+    ServoDescription,
+)
 from uam_sim_bridge.devices.dynamixel.goals import Command, goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.health import CycleMeter, ServoHealth
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
@@ -38,12 +43,16 @@ NEEDED_LATENCY = 0.001  # [s] of the adapter's timer
 
 @dataclass(frozen=True)
 class Reading:
-    """Joint angles (n,) [rad], velocities (n,) [rad/s], motor torques (n,) [N m] at `time` [s]."""
+    """Joint angles (n,) [rad], velocities (n,) [rad/s], motor torques (n,) [N m] at `time` [s].
+
+    grip (2,): opening [m] and closing force [N] of a gripper, NaN while it does not answer.
+    """
 
     time: float
     position: np.ndarray
     velocity: np.ndarray
     effort: np.ndarray
+    grip: np.ndarray
 
 
 class ArmDriver:
@@ -88,13 +97,14 @@ class ArmDriver:
         self._fast, self._open = parameters.fast_sync_read, False
         self._lock = threading.RLock()
         self._command: Command | None = None
+        self._opening = math.nan  # [m] goal of the gripper
         self._reading: Reading | None = None
         self._next_open, self._last_cycle = -math.inf, math.nan
 
     @property
     def budget(self) -> Budget:
         """The time budget of a cycle with these parameters."""
-        return budget(
+        found = budget(
             servos=len(self.chain.servos),
             baud_rate=self.chain.baud_rate,
             return_delay=self.chain.return_delay,
@@ -103,11 +113,13 @@ class ArmDriver:
             slow_every=max(1, round(self.parameters.slow_interval * self.rate)),
             goal=4 if self.in_position_mode else 2,
         )
+        further = () if self.chain.gripper is None else (GRIPPER_GOAL,)
+        return replace(found, items=(*found.items, *further))
 
     @property
     def lost(self) -> list[ServoHealth]:
-        """The servos that do not answer."""
-        return [one for one in self.health if one.lost]
+        """The servos of the arm that do not answer."""
+        return [one for one in self.health if one.lost and one.joint != GRIPPER]
 
     @property
     def problems(self) -> list[str]:
@@ -139,10 +151,12 @@ class ArmDriver:
         counts = []
         for servo, health in zip(chain.servos, self.health, strict=True):
             health.error = tried(bus.read, servo.id, servo.table[names.HARDWARE_ERROR])
+            if servo.joint == GRIPPER:
+                continue
             at = servo.table[names.PRESENT_POSITION]
             counts.append(tried(bus.read_signed, servo.id, at))
         self.start_angles = startup.angles(chain, counts)
-        stowed = [servo.stowed for servo in chain.servos]
+        stowed = [servo.stowed for servo in chain.arm]
         self.remarks += startup.pose_findings(chain, counts, stowed, p.pose_tolerance)
         self.remarks += [health.problem for health in self.health if health.problem]
 
@@ -154,6 +168,10 @@ class ArmDriver:
     def command_position(self, goal: np.ndarray) -> None:
         """Take goal positions (n,) [rad]; NaN: none yet."""
         self._command = Command(np.array(goal, dtype=float), np.zeros(len(goal)), self._clock())
+
+    def command_gripper(self, opening: float) -> None:
+        """Take the goal of the gripper: opening [m], within its stroke."""
+        self._opening = opening
 
     def cycle(self) -> Reading | None:
         """Write the goals and read the states; None if not every servo answered.
@@ -199,7 +217,7 @@ class ArmDriver:
             if not (released and self.in_position_mode and self._open):
                 return ""
             problems = []
-            for servo in self.chain.servos:
+            for servo in self.chain.arm:
                 try:
                     tried(self.bus.write, servo.id, servo.table[names.TORQUE_ENABLE], 0)
                 except (NoAnswer, Refused, BusLost) as error:
@@ -236,7 +254,7 @@ class ArmDriver:
         command, reading = self._command, self._reading
         self.stale = command is None or now - command.time > self.parameters.effort_timeout
         unprepared, turns = self._upkeep.unprepared, self._upkeep.turns
-        ready = [pair for pair in enumerate(self.chain.servos) if pair[1].id not in unprepared]
+        ready = [pair for pair in enumerate(self.chain.arm) if pair[1].id not in unprepared]
         if self.in_position_mode:
             register, goals = names.GOAL_POSITION, {}
             for i, servo in ready if command is not None else ():
@@ -250,6 +268,11 @@ class ArmDriver:
                     goals[servo.id] = self._goal_current(servo, command, i, reading.position[i])
         if goals:
             self.bus.sync_write(self.chain.servos[0].table[register], goals)
+        hand = self.chain.gripper
+        if hand is not None and hand.id not in unprepared and math.isfinite(self._opening):
+            angle = self._opening / self.chain.transmission
+            goal = goal_position(hand, angle, turns[len(self.chain.arm)])
+            self.bus.sync_write(hand.table[names.GOAL_POSITION], {hand.id: goal})
 
     def _goal_current(self, servo: ServoDescription, command: Command, i: int, angle: float) -> int:
         effort, velocity = float(command.values[i]), float(command.velocity[i])
@@ -273,16 +296,24 @@ class ArmDriver:
         taken = 0.5 * (begun + self._clock())
         for i, servo in enumerate(ids):
             self._upkeep.count(i, servo in found)
-        if len(found) < len(ids):
+        if any(servo.id not in found for servo in self.chain.arm):
             return None
         rows = []
         for i, servo in enumerate(self.chain.servos):
+            if servo.id not in found:
+                rows.append((math.nan, math.nan, math.nan))
+                continue
             counts, speed, current = self._decoded(servo, found[servo.id])
             if servo.id in self._upkeep.unprepared and not self.released:
                 self._upkeep.prepare(i, counts)
             angle = servo.angle(counts + self._upkeep.turns[i])
             rows.append((angle, servo.velocity(speed), servo.effort(current)))
-        self._reading = Reading(taken, *np.array(rows, dtype=float).T)
+        count, lever = len(self.chain.arm), self.chain.transmission
+        values, grip = np.array(rows, dtype=float).T, np.full(2, math.nan)
+        if self.chain.gripper is not None:
+            angle, _, torque = values[:, count]
+            grip[:] = angle * lever, -torque / lever
+        self._reading = Reading(taken, *values[:, :count], grip)
         return self._reading
 
     def _decoded(self, servo: ServoDescription, data: bytes) -> list[int]:

@@ -94,7 +94,7 @@ def centre_of(driver: ArmDriver, joint: int, start: float, p: ExcitationParamete
 
     Raises Aborted if there is none.
     """
-    servo, reach = driver.chain.servos[joint], math.radians(p.amplitude_deg + p.margin_deg)
+    servo, reach = driver.chain.arm[joint], math.radians(p.amplitude_deg + p.margin_deg)
     low, high = servo.low + reach, servo.high - reach
     if low > high:
         widest = math.degrees(0.5 * (servo.high - servo.low)) - p.margin_deg
@@ -169,7 +169,7 @@ def _check(driver: ArmDriver, reading: Reading, error: np.ndarray, p: Excitation
     """Raise Aborted if a limit is exceeded."""
     if problems := driver.problems:
         raise Aborted("; ".join(problems))
-    for i, servo in enumerate(driver.chain.servos):
+    for i, servo in enumerate(driver.chain.arm):
         angle, speed = reading.position[i], reading.velocity[i]
         heat = driver.health[i].temperature
         if not servo.low <= angle <= servo.high:

@@ -126,7 +126,8 @@ def _settings(
     """Yield (register, required value, reason)."""
     yield names.STATUS_LEVEL, ALL_STATUS, "the driver reads the errors of every write"
     yield names.RETURN_DELAY, chain.return_delay_counts, "part of the bus budget"
-    yield names.OPERATING_MODE, mode, "servos.mode of the vehicle"
+    own = mode if servo.mode is None else servo.mode
+    yield names.OPERATING_MODE, own, "servos.mode of the vehicle, a gripper's position mode"
     yield names.CURRENT_LIMIT, servo.current_limit_counts, "current_limit of the hardware file"
 
 
@@ -163,7 +164,7 @@ def check_turn(chain: ArmChain) -> None:
 
 def angles(chain: ArmChain, counts: Sequence[int]) -> list[float]:
     """Return the joint angles (n,) [rad] at positions (n,) [counts] within one turn."""
-    return [_angle(servo, count) for servo, count in zip(chain.servos, counts, strict=True)]
+    return [_angle(servo, count) for servo, count in zip(chain.arm, counts, strict=True)]
 
 
 def pose_findings(
@@ -174,7 +175,7 @@ def pose_findings(
     counts (n,): positions as read; stowed (n,) [rad]: angles at which the arm should be. Angles
     that would fit with servos swapped or a direction reversed are named as such.
     """
-    servos = chain.servos
+    servos = chain.arm
     measured = angles(chain, counts)
     pairs = list(zip(servos, measured, strict=True))
     found = [

@@ -74,7 +74,11 @@ class Upkeep:
         servo = self._chain.servos[i]
         self.turns[i] = servo.turned(counts)
         steps = [(names.BUS_WATCHDOG, 0)]
-        if self._p_gain is None:
+        if servo.mode is not None:  # its goal is then the present position
+            profile = round(servo.speed / servo.table.velocity_unit)
+            steps += [(names.PROFILE_VELOCITY, profile), (names.TORQUE_ENABLE, 1)]
+            steps += [(names.GOAL_CURRENT, servo.current_limit_counts)]
+        elif self._p_gain is None:
             steps += [(names.GOAL_CURRENT, 0), (names.TORQUE_ENABLE, 1)]
         else:
             steps += [(names.POSITION_P_GAIN, round(self._p_gain)), (names.TORQUE_ENABLE, 1)]

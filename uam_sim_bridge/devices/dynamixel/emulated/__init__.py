@@ -7,6 +7,7 @@ from uam_sim_bridge.devices.dynamixel.emulated.shafts import (
     ArmShafts,
     Drive,
     FrictionShaft,
+    JointShaft,
     Shaft,
     StillShaft,
 )
