@@ -1,4 +1,4 @@
-"""A tour of goals: take off, fly to some places one after the other, come back and land.
+"""A tour of goals: take off, fly to some places one after the other, bring the hand to one, land.
 
 python examples/goto_tour.py [FOLDER]
 """
@@ -24,10 +24,19 @@ def main():
             flight.wait_for("goal")
             held = flight.wait_for("holding")
             print(f"  there at {held.time:.1f} s, {1000.0 * held.position_error:.1f} mm off")
+        print("hand to (0.4, 0.2, 0.7):", flight.hand.goto(0.4, 0.2, 0.7))
+        flight.wait_for("goal")
+        flight.wait_for("holding")
+        at = flight.hand.pose.pose.position
+        print(f"  hand: {1000.0 * math.dist((at.x, at.y, at.z), (0.4, 0.2, 0.7)):.1f} mm off")
         try:
             flight.goto(99.0, 0.0, 1.0)
         except CommandRefused as refusal:
             print("too far:", refusal)
+        try:
+            flight.hand.goto(0.4, 0.2, -0.1)
+        except CommandRefused as refusal:
+            print("too low:", refusal)
         print(flight.land())
         result = flight.wait()
     print("landed:", result.outcome.transitions[-1]["cause"])
