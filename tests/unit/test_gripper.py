@@ -16,6 +16,7 @@ from uam_control.grasp.grippers import GRIPPERS
 from uam_control.grasp.windows import Approach
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.motion.trajectory import Move
+from uam_control.settings import configuration
 from uam_control.vehicle import VehicleError, chain_of, derived_parameters, load_description
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -69,6 +70,32 @@ def test_a_derived_file_is_checked_as_a_whole(tmp_path, text, reason):
     with pytest.raises(ValueError) as refused:
         load_description(file)
     assert reason in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_the_design_of_a_derived_vehicle_acts(tmp_path):
+    file, design = tmp_path / "own.yaml", tmp_path / "own_profile.yaml"
+    file.write_text("derives: s500_gripper\n")
+    assert load_description(file).profile("modular") == "s500"
+    design.write_text("")
+    assert load_description(file).profile("modular") == str(design)
+
+
+def test_files_beside_a_vehicle_count_for_what_derives_from_it(tmp_path):
+    """Base and heir are in two folders; gripper and design are beside the base."""
+    base, heir = tmp_path / "base.yaml", tmp_path / "heirs" / "heir.yaml"
+    grippers = configuration.root() / "grippers"
+    for name in ("two_finger.yaml", "two_finger.xml"):
+        (tmp_path / name).write_text((grippers / name).read_text())
+    gains = (configuration.root() / "autopilot" / "s500.yaml").read_text()
+    (tmp_path / "base_autopilot.yaml").write_text(gains)
+    base.write_text(
+        "derives: s500_gripper\nautopilot: null\ngripper: {type: two_finger.yaml, force: 5}\n"
+    )
+    heir.parent.mkdir()
+    heir.write_text("derives: ../base.yaml\nmass: 2.302\n")
+    found = load_description(heir)
+    assert found.models[1].samefile(tmp_path / "two_finger.xml") and found.gripper.force == 5.0
+    assert found.autopilot_gains == S500.autopilot_gains
 
 
 def test_a_body_that_is_not_there_is_named(tmp_path):

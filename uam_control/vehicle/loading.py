@@ -47,7 +47,7 @@ def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescr
 
 def _derived(file: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Return the content of a vehicle's file; with `derives`, its entries replace those of the
-    vehicle that it names, entry by entry; null leaves one out."""
+    vehicle that it names, entry by entry; null leaves one out. Its own design acts, too."""
     top = read_section(file, VehicleError)
     if not top.has("derives"):
         return top.values
@@ -56,15 +56,31 @@ def _derived(file: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     )
     if other.resolve() in (*above, file.resolve()):
         raise top.error("derives", f"{other.name} derives from {file.name}")
-    base = _derived(other, (*above, file.resolve()))
-    here = Section(base, f"{other}:", VehicleError)
-    base = base | {"model": str(other.parent / here.text("model"))}
-    if profiles := _profiles(here, other):
-        base["profiles"] = profiles
-    if here.has("autopilot"):
-        base["autopilot"] = configuration.beside(other, "autopilot", here.text("autopilot"))
+    base = _with_paths(_derived(other, (*above, file.resolve())), other)
+    for key, kind in (("profiles", PROFILE_FILE), ("autopilot", AUTOPILOT_FILE)):
+        if designed(file, kind).is_file():
+            base.pop(key, None)
     own = {key: value for key, value in top.values.items() if key != "derives"}
     return _replaced(base, own)
+
+
+def _with_paths(document: dict[str, Any], file: Path) -> dict[str, Any]:
+    """Return the content of a vehicle's `file` for a file elsewhere: with its design, and with
+    whole paths of the files that stand beside it."""
+    here, found = Section(document, f"{file}:", VehicleError), dict(document)
+    found["model"] = str(file.parent / here.text("model"))
+    if profiles := _profiles(here, file):
+        found["profiles"] = profiles
+    own = designed(file, AUTOPILOT_FILE)
+    if here.has("autopilot"):
+        found["autopilot"] = configuration.beside(file, "autopilot", here.text("autopilot"))
+    elif own.is_file():
+        found["autopilot"] = str(own)
+    gripper = document.get("gripper")
+    if isinstance(gripper, dict) and "type" in gripper:
+        named = configuration.beside(file, "grippers", str(gripper["type"]))
+        found["gripper"] = gripper | {"type": named}
+    return found
 
 
 def _replaced(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
