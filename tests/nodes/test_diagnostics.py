@@ -8,6 +8,7 @@ from free_port import free_port
 
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -151,3 +152,31 @@ def test_an_estimator_reports_rejected_poses(start, probe):
     probe.until(fed, "a warning")
     assert "new poses refused: too far from the estimate" in found.status.message
     assert int(found.values["poses refused"]) > 0
+
+
+def test_a_hand_that_is_not_stabilised_any_more_is_announced(start, probe):
+    """A straight arm hangs: its hand cannot go up or down."""
+    found = NodeDiagnostics(probe, "arm_controller")
+    start("uam_control.nodes.arm_controller", "--ros-args", "-p", "hand_bandwidth:=10.0")
+    inputs = topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND
+    state, reference, position = map(probe.publisher, inputs)
+    probe.until_connected("arm_controller", [state, reference, position])
+    states, references, positions = (
+        TrajectoryWriter(COORDINATES),
+        ReferenceWriter(2),
+        PositionCommandWriter(),
+    )
+    rows, stamp = np.zeros((3, SIZE)), 0
+
+    def told(bend, level, text):
+        nonlocal stamp
+        stamp, rows[0, -1] = stamp + 4_000_000, bend
+        state.publish(states.fill(stamp, rows))
+        reference.publish(references.fill(stamp, rows, True, stamp))
+        position.publish(positions.fill(stamp, rows, np.zeros((3, 3)), np.zeros(3)))
+        now = found.values.get("hand's stabilisation", "")
+        return found.status and found.status.level == level and text in now
+
+    probe.until(lambda: told(1.5, OK, "acts"), "a hand that is stabilised")
+    probe.until(lambda: told(0.0, WARN, "fades out: near a singular posture"), "a warning")
+    assert "the hand's stabilisation fades out" in found.status.message

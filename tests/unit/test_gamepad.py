@@ -80,6 +80,10 @@ def test_keys_count_as_held_for_a_while():
         np.testing.assert_allclose(pad.twist(), expected)
     pad.read(*keys.state(1.6))
     assert not pad.twist().any()
+    for key, value in (("w", 0.1), ("s", -0.1), ("w", 0.1)):
+        keys.press(key, 1.9)
+        pad.read(*keys.state(1.95))
+        assert pad.twist()[0] == pytest.approx(value)
     keys.press("h", 2.0)
     assert pad.read(*keys.state(2.1)) == (True, None)
 

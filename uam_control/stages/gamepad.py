@@ -146,6 +146,7 @@ class Keys:
         """Take a key at `now` [s]; return whether it is one of the mapping."""
         known = key in self._mapping.keys
         if known:
+            self._until.pop(key, None)  # the newest key of an axis counts
             self._until[key] = now + self._mapping.key_time
         return known
 
