@@ -23,7 +23,7 @@ import numpy as np
 from uam_control.arm.hand import HEADING, reach, tools
 from uam_control.coordinates import ARM, CHI, POSITION, YAW, Z
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.hand_goals import HandPose, HandTwist
+from uam_control.mission.hand_goals import HandPose, HandTwist, joint_room
 from uam_control.mission.motion.flyer import Flyer
 from uam_control.mission.plan_limits import room
 from uam_control.supervision import State
@@ -103,7 +103,7 @@ class Hovering:
 
 def inside(flight: Hovering, rng: np.random.Generator, heading_only: bool) -> np.ndarray:
     """Return TOOL (6,) of a pose that the vehicle can have."""
-    low, high = flight.limits.joint_ranges
+    low, high = joint_room(flight.limits)
     corners = room(flight.limits, flight.ground)
     chi = flight.reference_of_base.copy()
     chi[POSITION] = np.clip(chi[POSITION] + rng.uniform(-REACH, REACH, 3), *corners)

@@ -5,17 +5,18 @@ The vehicle follows its reference exactly; the forward kinematics judge where th
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from followed_reference import Flight
+from followed_reference import Flight, limits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.arm.hand import tools
 from uam_control.arm.placing import placed, turning
 from uam_control.coordinates import ARM, CHI, CHI_DOT, YAW
-from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist
+from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist, joint_room
 from uam_control.mission.motion.flyer import Flyer, flattened
 from uam_control.mission.plans import GoalPose
 from uam_control.supervision import Event, OperatorCommand, State
@@ -282,3 +283,17 @@ def test_a_jog_of_zeros_ends_a_jog_and_nothing_else():
     assert not flight.state[CHI_DOT].any()
     assert flight.mission.plan(still) == (True, "accepted: nothing to stop")
     flight.assert_smooth()
+
+
+def test_a_goal_keeps_off_the_ends_of_the_joints():
+    """There the supervisor holds; the S-500's second joint ends at 2.05 rad."""
+    flight = hovering()
+    assert flight.mission.plan(pose("s500_arm", 0.3, 0.0, 0.25))[0]
+    flight.until(lambda output: output.state is State.HOLDING)
+    low, high = flight.limits.joint_ranges
+    assert (flight.state[CHI, ARM] >= low + 0.03).all()
+    assert (flight.state[CHI, ARM] <= high - 0.03).all()
+    room = joint_room(flight.limits)
+    np.testing.assert_allclose(room[:, 1], [-2.02, 2.02])
+    narrow = joint_room(replace(limits(VEHICLES["s500_arm"]), joint_angle_hold=(0.01, 1.0)))
+    np.testing.assert_allclose(narrow, [[0.0, -0.97], [0.0, 0.97]])

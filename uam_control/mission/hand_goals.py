@@ -34,6 +34,7 @@ from uam_control.mission.plans import (
 
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
+WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
 INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
 # of the way at full speed, in which a jog stops: the quintic of 0.4 ends without jerk, so gently
 SHARE = 0.4
@@ -219,9 +220,16 @@ def _met(
             f"lost from {math.degrees(UPRIGHT):.0f} deg on"
         )
     space = room(p, ground) + [[INSIDE], [-INSIDE]]
-    found = placed(flyer.chain, wanted, reference[CHI, ARM], p.joint_ranges, space)
+    found = placed(flyer.chain, wanted, reference[CHI, ARM], joint_room(p), space)
     _check_reach(found, space)
     return found.chi
+
+
+def joint_room(p: MissionParameters) -> np.ndarray:
+    """Return lowest and highest angles (2, n) [rad] of a goal."""
+    low, high = p.joint_ranges
+    half = np.maximum((high - low) / 2.0 - WITHIN, 0.0)
+    return (low + high) / 2.0 + np.stack([-half, half])
 
 
 def _below(height: float, p: MissionParameters) -> str:
