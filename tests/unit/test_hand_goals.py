@@ -142,6 +142,8 @@ def test_another_goal_of_the_base_replaces_the_hand_and_keeps_the_arm():
         (pose("s500_arm", 9.0, 0.0, 1.0), "out of reach: the base would be at x = 8.7"),
         (pose("s500_arm", 0.0, 0.0, 0.1), "out of reach: the base would be at z = 0.44 m"),
         (pose("s500_arm", 0.0, 0.0, -0.1), "out of reach: the hand's z is -0.10 m, the floor is"),
+        (pose("s500_arm", 1e308, -1e308, 1.0), "out of reach: a place is more than 100 m outside"),
+        (pose("t650", 0.0, 1e16, 1.0, 0.0, 0.1, 0.1), "out of reach: a place is more than 100 m"),
         (pose("s500_arm", FREE, 0.0, 1.0), "a coordinate of the goal is not finite"),
         (pose("s500_arm", 0.0, 0.0, 1.0, math.inf), "a coordinate of the goal is not finite"),
         (pose("s500_arm", 0.0, 0.0, 1.0, 0.0, 0.4, 0.0), "the arm leaves the tool 23 deg from its"),
@@ -204,6 +206,16 @@ def test_a_trajectory_is_checked_as_the_bases(times, rows, text):
     made = points("s500_arm", times, [(*(here[:3] + row), 0.0) for row in rows])
     accepted, answer = flight.mission.plan(made)
     assert not accepted and re.search(text, answer), answer
+
+
+def test_velocities_that_no_base_can_have_are_refused():
+    flight = hovering()
+    here = hand("s500_arm", flight.state[CHI])
+    for size in (1e308, 1e16, 50.0):
+        made = points("s500_arm", [0.0, 9.0], [(*here[:3], 0.0)] * 2, np.full((2, 2, 4), size))
+        with np.errstate(all="ignore"):
+            accepted, answer = flight.mission.plan(made)
+        assert not accepted and answer.startswith("refused: "), answer
 
 
 def jogged(flight, goal, seconds, every=5):

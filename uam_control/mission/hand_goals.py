@@ -35,6 +35,7 @@ from uam_control.mission.plans import (
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
+FAR = 100.0  # [m] from the base's room: no arm is as long
 INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
 # of the way at full speed, in which a jog stops: the quintic of 0.4 ends without jerk, so gently
 SHARE = 0.4
@@ -109,6 +110,8 @@ class HandPoints(Goal):
         points[CHI] = chi
         if len(self.times) > 1:
             self._follow(hand, points)
+        if not np.isfinite(points).all():
+            raise PlanRefused("too fast: a velocity or acceleration that no base can have")
         return Points(self.times, points, BOTH, self)
 
     def _follow(self, hand: np.ndarray, points: np.ndarray) -> None:
@@ -220,6 +223,11 @@ def _met(
             f"lost from {math.degrees(UPRIGHT):.0f} deg on"
         )
     space = room(p, ground) + [[INSIDE], [-INSIDE]]
+    places = wanted[:, POSITION]
+    if not np.abs(places - np.clip(places, *space)).max() <= FAR:
+        raise PlanRefused(
+            f"out of reach: a place is more than {FAR:g} m outside of the base's room"
+        )
     found = placed(flyer.chain, wanted, reference[CHI, ARM], joint_room(p), space)
     _check_reach(found, space)
     return found.chi
@@ -241,14 +249,14 @@ def _check_reach(found: Placed, space: np.ndarray) -> None:
     which = "point {}: " if len(found.off) > 1 else ""
     beyond, turned = np.abs(found.off[:, BEYOND]), np.abs(found.off[:, TURNED])
     row, axis = np.unravel_index(np.argmax(beyond), beyond.shape)
-    if beyond[row, axis] > INSIDE:
+    if not beyond[row, axis] <= INSIDE:
         low, high = space[:, axis]
         raise PlanRefused(
             f"out of reach: {which.format(row)}the base would be at {'xyz'[axis]} = "
             f"{found.chi[row, axis]:.2f} m, allowed {low:.2f} to {high:.2f} m"
         )
     row, axis = np.unravel_index(np.argmax(turned), turned.shape)
-    if turned[row, axis] > TURNED_BY:
+    if not turned[row, axis] <= TURNED_BY:
         raise PlanRefused(
             f"out of reach: {which.format(row)}the arm leaves the tool "
             f"{math.degrees(turned[row, axis]):.0f} deg from its {('elevation', 'lean')[axis]}"
