@@ -141,7 +141,8 @@ def read_flight(
     else:
         flyer = Flyer.with_hand(vehicle)
         joints, rotors = len(vehicle.joints), len(vehicle.rotors)
-    columns = timeseries.columns(joints, rotors, flyer is not None)
+    fingers = log.width(topics.TRUTH_MAGNET) > 2  # magnet, swing
+    columns = timeseries.columns(joints, rotors, flyer is not None, fingers)
     states = topics.TRUTH_STATE if simulated else topics.STATE
     references = References(log, columns.size)
     truth = log.samples(states, STATE_ROWS, columns.size)
