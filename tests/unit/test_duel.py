@@ -58,7 +58,7 @@ def test_standing_is_the_mean_error_in_the_second_half_of_the_longest_phase():
 
 
 def test_the_shipped_duel_flies_every_row_in_every_task():
-    duel = load_duel("t650", ("default", "MAC"))
+    duel = load_duel("fsc_lab", ("default", "MAC"))
     planned = list(trials(duel, 2))
     assert len(planned) == 2 * (7 * 2 + len(duel.delays))
     assert {one.label for one in planned} == {"default", "MAC"}
@@ -74,7 +74,7 @@ def test_the_shipped_duel_flies_every_row_in_every_task():
     ],
 )
 def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
-    document = yaml.safe_load(configuration.path("duel/t650.yaml").read_text())
+    document = yaml.safe_load(configuration.path("duel/fsc_lab.yaml").read_text())
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(document | change))
     with pytest.raises(ConfigurationError, match=said) as found:
@@ -84,7 +84,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
 
 def test_an_unknown_row_is_refused():
     with pytest.raises(ConfigurationError, match="no such row"):
-        load_duel("t650", ("nobody",))
+        load_duel("fsc_lab", ("nobody",))
 
 
 def test_geometric_l1_has_the_published_stiffness_and_damping():

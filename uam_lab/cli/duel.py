@@ -14,7 +14,7 @@ EXAMPLES = """\
 examples:
   uam duel                              every row, three seeds: some 400 flights
   uam duel --seeds 1 --rows "default, hand"
-  uam duel mine.yaml --out mine         a file as config/duel/t650.yaml; a stopped duel continues
+  uam duel mine.yaml --out mine         a file as config/duel/fsc_lab.yaml; a stopped duel continues
 
 Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
 """
@@ -31,8 +31,8 @@ def add(commands: Subcommands) -> None:
         "platform and heading beside the published ones, standing offset and survived delay.",
         EXAMPLES,
     )
-    text = "a duel of config/duel, or a file (default: t650)"
-    command.option("name", "NAME|FILE", text, "t650", nargs="?")
+    text = "a duel of config/duel, or a file (default: fsc_lab)"
+    command.option("name", "NAME|FILE", text, "fsc_lab", nargs="?")
     command.option("--seeds", "N", "seeds 1..N (default: the duel's)", type=count)
     command.option("--rows", "LABEL", "rows that fly (default: all)", nargs="+")
     command.workers()
