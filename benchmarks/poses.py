@@ -60,7 +60,7 @@ def main() -> None:
             for seed in options.seeds:
                 done = fly(Trial(name, profile, 0.0, seed, scenario, vehicle_changes=changes))
                 series = done.series
-                flown = np.isfinite(series["reference.x"]) & np.isfinite(series["truth.x"])
+                flown = series.flown
                 true, own = (distance(series, one, flown) for one in ("truth", "estimate"))
                 arm = np.degrees(
                     [series[f"estimate.{j}"] - series[f"reference.{j}"] for j in joints]

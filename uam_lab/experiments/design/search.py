@@ -69,8 +69,8 @@ def design(
     for number in range(1, ROUNDS + 1):
         try:
             found = search.evaluated()
-        except ProfileError:  # a gain below what a profile may have: slower does not help
-            break
+        except ProfileError as error:  # a gain below what a profile may have: slower does not help
+            raise DesignError(f"{described.name}: no gains: {error}") from None
         progress(f"round {number}: {found.summary}")
         if not found.faults:
             return search.result(found)
