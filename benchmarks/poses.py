@@ -1,6 +1,6 @@
 """What motion capture, odometry and the velocity of the joints cost: errors of flights.
 
-    python benchmarks/poses.py [--scenarios hover arm_motions circle.csv] [--seeds 1] [--only TEXT]
+    python benchmarks/poses.py [--scenarios hover arm_motions circle] [--seeds 1] [--only TEXT]
 
 The table has, over the whole flight of the direct engine, RMS: distance of the true position from
 the reference; of the estimate from the reference, which is all that an odometry can promise; angle
@@ -44,7 +44,7 @@ def distance(series: Series, block: str, flown: np.ndarray) -> float:
 def main() -> None:
     """Fly, print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenarios", nargs="+", default=["hover", "arm_motions", "circle.csv"])
+    parser.add_argument("--scenarios", nargs="+", default=["hover", "arm_motions", "circle"])
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--only", default="", help="rows whose name contains this text")
     options = parser.parse_args()
