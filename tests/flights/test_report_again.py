@@ -62,7 +62,7 @@ def test_two_flights_overlaid(shared_flights, tmp_path, few_figures, capsys):
     assert main.main(["report", str(shared_flights.single.out), str(cut), "--out", str(out)]) == 0
     page = (out / "report.html").read_text()
     assert "2 flights" in page and page.count("<td>cut</td>") == 3
-    assert page.count("data:image/png") == 2
+    assert page.count('<img src="data:image/png') == 2
     assert [file.name for file in cut.iterdir()] == ["log.mcap"]
 
 
