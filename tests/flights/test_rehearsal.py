@@ -99,6 +99,7 @@ def test_a_box_is_carried_by_the_grippers_servo_on_the_bus(tmp_path):
     arm["gripper"] = {"id": 3, "model": "xm430_w350", "direction": 1, "zero": 1200}
     mocap = yaml.safe_load(template())["mocap"] | {"payload": "box"}
     changes = {"vehicle": "s500_gripper", "scenario": "two_finger", "magnet": {"through": "servo"}}
+    changes["layout"] = "fused"  # two cores do not keep three servos at 250 Hz beside all nodes
     status, said, out = rehearse(tmp_path, arm=arm, mocap=mocap, **changes)
     if too_slow(said, out):
         return
