@@ -131,7 +131,9 @@ def test_the_autopilot_is_the_stand_in_or_px4_on_both_of_its_lines(tmp_path):
     assert found["--usb"] == [f"{devices}/ttyUSB"] and found["--px4-dir"] == [str(tmp_path)]
     assert found["--param"] == ["SDLOG_MODE=0"] and found["--log"] == [f"{tmp_path}/px4.ulg"]
     assert [Path(one).name for one in found["--params"]] == ["sitl.yaml", "rehearsed.yaml"]
-    settings = laboratory_process.parameters(lab, options, devices, tmp_path, PORTS)
+    room = {"environment": [{"kind": "stand"}]}
+    settings = laboratory_process.parameters(lab, options, devices, tmp_path, PORTS, room)
+    assert json.loads(settings["vehicle_changes"])["environment"] == room["environment"]
     assert settings["hil"] == "line"
     # what PX4 gets is what the list of a vehicle requires, except that it is in the loop
     values = px4_parameters.load(lab.vehicle, found["--params"], found["--param"])
@@ -152,7 +154,7 @@ def test_a_gripper_is_on_its_output(tmp_path):
     lab, options = load_lab(file), RehearsalOptions(px4=Px4Installation(tmp_path))
     _, own = laboratory_process.autopilot(lab, options, tmp_path, tmp_path, PORTS)
     assert words(own)["--param"] == ["PWM_MAIN_FUNC12=430"]
-    settings = laboratory_process.parameters(lab, options, tmp_path, tmp_path, PORTS)
+    settings = laboratory_process.parameters(lab, options, tmp_path, tmp_path, PORTS, {})
     assert (settings["magnet_on"], settings["magnet_off"], settings["magnet_output"]) == (1, -1, 2)
 
 

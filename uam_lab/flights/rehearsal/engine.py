@@ -79,7 +79,8 @@ class RehearsalEngine:
             sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
             _prepare_checklist(sections, self._options.checklist)
             sections[LABORATORY] = laboratory_process.parameters(
-                lab, self._options, devices, logs, ports, _flight_limit(settings)
+                *(lab, self._options, devices, logs, ports),
+                *(settings.scenario.surroundings, _flight_limit(settings)),
             )
             node_arguments.write(sections, settings, folder)
             rehearsal = _Rehearsal(lab, settings, self._options, folder, ports, observer, stop)

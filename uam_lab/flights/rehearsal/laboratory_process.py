@@ -6,6 +6,7 @@ The autopilot is the stand-in, or a PX4 in HITL with both of its lines as pseudo
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,15 +41,16 @@ def parameters(
     devices: Path,
     logs: Path,
     ports: Ports,
+    surroundings: Mapping[str, Any],
     flight_limit: float = 0.0,
 ) -> dict[str, Any]:
     """Return the parameters of the laboratory; lab: as rehearsed; devices, logs: folders.
 
-    flight_limit [s]: see `LaboratoryParameters`.
+    surroundings: of the scenario; flight_limit [s]: see `LaboratoryParameters`.
     """
     found = {
         "vehicle": lab.vehicle.source,
-        "vehicle_changes": json.dumps(dict(options.vehicle_changes)),
+        "vehicle_changes": json.dumps(dict(options.vehicle_changes) | surroundings),
         "payload_mass": float(options.payload_mass),
         "seed": options.seed,
         "arm_start": list(options.arm_start),
