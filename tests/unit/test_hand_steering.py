@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.arm.hand import hands
-from uam_control.control.hand_steering import HandParameters, hardest
+from uam_control.control.hand_steering import HandParameters, hardest, squared
 from uam_control.stages.hand_stage import HandStage
 from uam_control.vehicle import chain_of, load_description
 
@@ -144,4 +144,4 @@ def test_it_says_why_it_fades_out_where_it_is_on():
 def test_the_hardest_direction_by_hand(columns, directions, least):
     jacobian = np.zeros((6, len(columns)))
     jacobian[:3] = np.array(columns).T
-    assert hardest(jacobian, directions) == pytest.approx(least, abs=1e-12)
+    assert hardest(squared(jacobian), directions) == pytest.approx(least, abs=1e-12)

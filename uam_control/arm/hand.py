@@ -8,6 +8,7 @@ are lost only where the tool's y axis stands upright.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import hand_jacobian, hand_pose, last_link
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import matrix_from_euler
+from uam_control.maths.rotations import matrix_from_euler, wrap_angle
 from uam_control.maths.vectors import (
     Rows,
     Vector,
@@ -113,16 +114,16 @@ def tools(chain: Chain, chi: np.ndarray, swing: np.ndarray | None = None) -> np.
     return found
 
 
-def jacobians(chain: Chain, chi: np.ndarray, columns: list[int]) -> np.ndarray:
-    """Return the derivatives (m, 5, k) of HAND with respect to `columns` of chi (m, 6 + n)."""
-    now, found = hands(chain, chi), []
-    for column in columns:
+def jacobians(chain: Chain, chi: np.ndarray, columns: Sequence[int]) -> np.ndarray:
+    """Return the derivatives (m, 6, k) of TOOL with respect to `columns` of chi (m, 6 + n)."""
+    now, found = tools(chain, chi), np.empty((len(chi), len(TOOL), len(columns)))
+    for number, column in enumerate(columns):
         moved = chi.copy()
         moved[:, column] += STEP
-        change = hands(chain, moved) - now
-        change[:, HEADING:] = np.angle(np.exp(1j * change[:, HEADING:]))
-        found.append(change / STEP)
-    return np.stack(found, axis=2)
+        change = tools(chain, moved) - now
+        change[:, HEADING:] = wrap_angle(change[:, HEADING:])
+        found[:, :, number] = change / STEP
+    return found
 
 
 def least_change(slopes: np.ndarray, off: np.ndarray) -> np.ndarray:

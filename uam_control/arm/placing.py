@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.hand import ELEVATION, HEADING, LEAN, least_change, tools
+from uam_control.arm.hand import ELEVATION, HEADING, LEAN, STEP, jacobians, least_change, tools
 from uam_control.coordinates import ALPHA, ARM, POSITION, YAW
 from uam_control.maths.rotations import wrap_angle
 
 BEYOND, TURNED = slice(0, 3), slice(3, 5)  # columns of what is off: [m], [rad]
 TILTS = [ELEVATION, LEAN]  # of TOOL
-MOVED = 1e-6  # [rad] of numerical derivatives
 CLOSE = 1e-8  # [m, rad] at which the search ends
 ROUNDS = 30
 LONGEST = 0.5  # [rad] of one step of a joint
@@ -62,7 +61,7 @@ def turning(chain: Chain, chi: np.ndarray, rates: np.ndarray) -> tuple[np.ndarra
     """
     level = chi.copy()
     level[POSITION], level[YAW - 2 : YAW] = 0.0, 0.0
-    slopes = _slopes(chain, level)
+    slopes = jacobians(chain, level[None], range(ALPHA, len(chi)))[0]
     found = np.zeros_like(chi)
     if slopes.shape[1] and np.any(rates[TILTS]):
         found[ARM] = least_change(slopes[None, TILTS], rates[None, TILTS])[0]
@@ -74,23 +73,12 @@ def turning(chain: Chain, chi: np.ndarray, rates: np.ndarray) -> tuple[np.ndarra
     return found, rates[TILTS] - swung[TILTS]
 
 
-def _slopes(chain: Chain, chi: np.ndarray) -> np.ndarray:
-    """Return the derivatives (6, n) of TOOL with respect to the joints, at chi (6 + n,)."""
-    joints = len(chi) - ALPHA
-    moved = np.tile(chi, (joints + 1, 1))
-    moved[1:, ARM] += MOVED * np.eye(joints)
-    found = tools(chain, moved)
-    change = found[1:] - found[0]
-    change[:, HEADING:] = wrap_angle(change[:, HEADING:])
-    return change.T / MOVED
-
-
 def _approached(
     chain: Chain, wanted: np.ndarray, starts: np.ndarray, ranges: np.ndarray, room: np.ndarray
 ) -> Placed:
     """Return what is found from arms at `starts` (m, n) [rad] on, by least changes."""
     angles, (rows, joints) = np.clip(starts, *ranges), starts.shape
-    steps = MOVED * np.vstack([np.zeros(joints), np.eye(joints)])
+    steps = STEP * np.vstack([np.zeros(joints), np.eye(joints)])
     for _ in range(ROUNDS):
         moved = (angles[:, None] + steps).reshape(-1, joints)
         chi = _based(chain, np.repeat(wanted, joints + 1, axis=0), moved)
@@ -98,7 +86,7 @@ def _approached(
         off = off.reshape(rows, joints + 1, -1)
         if np.abs(off[:, 0]).max() <= CLOSE:
             break
-        slopes = ((off[:, 1:] - off[:, :1]) / MOVED).swapaxes(1, 2)
+        slopes = ((off[:, 1:] - off[:, :1]) / STEP).swapaxes(1, 2)
         step = least_change(slopes, -off[:, 0])
         ends = ((step < 0.0) & (angles <= ranges[0])) | ((step > 0.0) & (angles >= ranges[1]))
         step = least_change(np.where(ends[:, None], 0.0, slopes), -off[:, 0])

@@ -105,11 +105,12 @@ def steer(
     if m.has_hand == 0 or (m.bandwidth == 0.0 and m.weight == 0.0 and not h.correction[0].any()):
         return
     error, away = _error(h, state, reference)
-    m.why = _why(h, flying, away)
+    square = squared(h.jacobian)
+    m.why = _why(h, flying, away, square)
     wanted = m.bandwidth > 0.0 and m.why == STEERS
     m.weight = min(1.0, m.weight + dt / FADE) if wanted else max(0.0, m.weight - dt / FADE)
     if m.weight > 0.0 and away <= m.error_max:
-        goal = _least(h, error, m.damping)
+        goal = _least(h, error, square, m.damping)
     else:
         goal = (0.0, 0.0, 0.0)
     bandwidth = m.bandwidth if wanted else max(m.bandwidth, RETURN)
@@ -130,28 +131,35 @@ def steer(
 
 
 @jit
-def _why(h: HandArrays, flying: bool, away: float) -> int:
-    """Return which of FADES counts, for a hand that is `away` [m] from its place."""
+def _why(h: HandArrays, flying: bool, away: float, square: np.ndarray) -> int:
+    """Return which of FADES counts, for a hand that is `away` [m] from its place; square: see
+    `squared`."""
     m = h.numbers[0]
     if not flying:
         return IDLE
     if away > m.error_max:
         return FAR
-    return SINGULAR if hardest(h.jacobian, m.freedom) < m.singular else STEERS
+    return SINGULAR if hardest(square, m.freedom) < m.singular else STEERS
 
 
 @jit
-def hardest(jacobian: np.ndarray, freedom: int) -> float:
-    """Return how far the hand moves in its hardest direction [m/rad], at least.
-
-    jacobian (6, n); freedom: in how many directions it moves. Of the eigenvalues of J J^T, the
-    smallest that counts is at least the ratio of two elementary symmetric polynomials of them.
-    """
+def squared(jacobian: np.ndarray) -> np.ndarray:
+    """Return J J^T (3, 3) of the place's rows of jacobian (6, n)."""
     square = np.zeros((3, 3))
     for i in range(jacobian.shape[1]):
         for j in range(3):
             for k in range(3):
                 square[j, k] += jacobian[j, i] * jacobian[k, i]
+    return square
+
+
+@jit
+def hardest(square: np.ndarray, freedom: int) -> float:
+    """Return how far the hand moves in its hardest direction [m/rad], at least.
+
+    square (3, 3): J J^T; freedom: in how many directions it moves. Of the eigenvalues of J J^T, the
+    smallest that counts is at least the ratio of two elementary symmetric polynomials of them.
+    """
     a, b, c = rows(square)
     first = a[0] + b[1] + c[2]
     second = a[0] * b[1] - a[1] * b[0] + a[0] * c[2] - a[2] * c[0] + b[1] * c[2] - b[2] * c[1]
@@ -182,19 +190,17 @@ def _error(h: HandArrays, state: np.ndarray, reference: np.ndarray) -> tuple[Vec
 
 
 @jit
-def _least(h: HandArrays, error: Vector, damping: float) -> Vector:
+def _least(h: HandArrays, error: Vector, square: np.ndarray, damping: float) -> Vector:
     """Return y, so that J^T y is the least correction that has the hand where it should be.
 
-    (J J^T + damping^2) y = error + J correction, solved by Cramer's rule.
+    (J J^T + damping^2) y = error + J correction, solved by Cramer's rule. square: J J^T, to whose
+    diagonal the damping is added.
     """
     jacobian, count = h.jacobian[X:ROLL], h.correction.shape[1]
-    square = np.zeros((3, 3))
     goal = np.array(error)
     for i in range(count):
         for j in range(3):
             goal[j] += jacobian[j, i] * h.correction[0, i]
-            for k in range(3):
-                square[j, k] += jacobian[j, i] * jacobian[k, i]
     for j in range(3):
         square[j, j] += damping * damping
     a, b, c = rows(square)
