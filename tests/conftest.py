@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 
 # The first call of a compiled function takes seconds; a run must not depend on chance.
-settings.register_profile("uam", deadline=None, derandomize=True)
+settings.register_profile("uam", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("uam")
 
 # helper modules that several test folders import, and what the benchmarks are made of

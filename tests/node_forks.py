@@ -146,4 +146,6 @@ def become(module: str, arguments: list[str], log: str, environment: dict, folde
 if __name__ == "__main__":
     requested = serve(socket.socket(fileno=int(sys.argv[1])))
     if requested is not None:
-        sys.exit(become(*requested))
+        ended = become(*requested)
+        sys.stdout.flush()
+        os._exit(ended or 0)  # taking the interpreter down would copy all memory of this process

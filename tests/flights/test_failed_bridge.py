@@ -57,7 +57,7 @@ def test_in_flight_it_lands_the_vehicle():
     assert f"bridge: {REBOOTED}" in flight.mission.output.abort_reason
 
 
-@pytest.mark.parametrize("mode", [Mode.LAND, Mode.POSITION])
+@pytest.mark.parametrize("mode", [pytest.param(Mode.LAND, marks=pytest.mark.long), Mode.POSITION])
 def test_who_takes_over_from_a_failed_bridge_has_the_vehicle(mode):
     flight = failed(hovers)
     fly(flight, 0.3)

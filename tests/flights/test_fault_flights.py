@@ -29,6 +29,11 @@ SCENARIO = load_scenario("hover")
 QUICK_PICK = load_scenario("quick_pick")
 
 
+def longer(*values):
+    """A case that `make long` flies: another moment or seed of a case that `make test` flies."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
 def flown(*texts, seed=1, plant="calm", watch=None, scenario=SCENARIO):
     """A flight with faults: flight, series, metrics.
 
@@ -119,7 +124,11 @@ def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
 
 @pytest.mark.parametrize(
     "text",
-    ["mocap_dropout@pick+2.2+1.15", "mocap_freeze@pick+2.2+1.15", "mocap_jump@pick+2.2+1.15:x=0.3"],
+    [
+        "mocap_dropout@pick+2.2+1.15",
+        longer("mocap_freeze@pick+2.2+1.15"),
+        longer("mocap_jump@pick+2.2+1.15:x=0.3"),
+    ],
 )
 def test_poses_that_are_back_just_after_the_failsafe_limit_complete_the_mission(text):
     flight, _, figures = flown(text, scenario=QUICK_PICK)
@@ -128,7 +137,7 @@ def test_poses_that_are_back_just_after_the_failsafe_limit_complete_the_mission(
     assert State.BLIND in states and State.FAILSAFE not in states
 
 
-@pytest.mark.parametrize("text", ["mocap_dropout@pick+2.2", "mocap_freeze@carry+0.5"])
+@pytest.mark.parametrize("text", ["mocap_dropout@pick+2.2", longer("mocap_freeze@carry+0.5")])
 def test_without_poses_it_leaves_the_stand_before_the_autopilot_descends(text):
     flight, series, figures = flown(text, scenario=QUICK_PICK)
     assert classify(series, figures) == "failsafe" and not flight.armed
@@ -141,9 +150,11 @@ def test_without_poses_it_leaves_the_stand_before_the_autopilot_descends(text):
 @pytest.mark.parametrize(
     ("seed", "texts"),
     [  # body rates against the tilt came 0.19 s late: 178 degrees; now it levels by itself
-        (1, ("mavlink_delay@carry+1.93+1.056:direction=to_autopilot,delay=0.186",)),
+        longer(1, ("mavlink_delay@carry+1.93+1.056:direction=to_autopilot,delay=0.186",)),
         # outliers are not for the autopilot: it had stood on the ground, armed, for minutes
-        (4, ("imu_dropout@land+0.818+3", "mocap_outliers@take-off:share=0.371,distance=1.56")),
+        longer(
+            4, ("imu_dropout@land+0.818+3", "mocap_outliers@take-off:share=0.371,distance=1.56")
+        ),
         # nor exchanged axes, of which the estimate knows: was 173 degrees
         (2, ("mocap_swap@pick+2.2+4.423", "mocap_latency@take-off+0.4+1.5:delay=0.946")),
     ],
@@ -157,8 +168,8 @@ def test_what_is_known_to_be_wrong_does_not_reach_the_autopilot(seed, texts):
     ("seed", "text"),
     [  # the estimate followed these poses in *blind*: 176 degrees, 59 m high, 33 m/s
         (3, "mocap_swap@carry+0.2"),
-        (5, "mocap_swap@carry+0:axes=yz"),
-        (7, "mocap_swap@carry+0.2+3:axes=xz"),
+        longer(5, "mocap_swap@carry+0:axes=yz"),
+        longer(7, "mocap_swap@carry+0.2+3:axes=xz"),
         (2, "mocap_swap@take-off+1.085"),  # a contradiction in the open: no blind flight
     ],
 )
@@ -175,7 +186,7 @@ def test_wrong_poses_are_not_followed_before_the_vehicle_is_down(seed, text):
             "@pick+2.5+1.0:unit=companion,gyro=0.185,accelerometer=-5.13,axis=z,over=0.2",
             "completed",
         ),
-        ("@pick+2.2:unit=companion,gyro=0,accelerometer=3,axis=x,over=1", "failsafe"),
+        longer("@pick+2.2:unit=companion,gyro=0,accelerometer=3,axis=x,over=1", "failsafe"),
     ],
 )
 def test_beside_the_stand_a_faulty_imu_moves_the_vehicle_clear_of_it_first(text, outcome):
@@ -185,7 +196,7 @@ def test_beside_the_stand_a_faulty_imu_moves_the_vehicle_clear_of_it_first(text,
     assert State.BLIND in [change.target for change in flight.mission.changes]
 
 
-@pytest.mark.parametrize(("late", "seed"), [(0.26, 1), (0.5, 2), (0.75, 1)])
+@pytest.mark.parametrize(("late", "seed"), [(0.26, 1), longer(0.5, 2), longer(0.75, 1)])
 def test_a_landing_beside_the_stand_moves_clear_of_it_first(late, seed):
     text = f"mocap_latency@take-off+3:delay={late}"
     _, series, figures = flown(text, scenario=QUICK_PICK, seed=seed)
@@ -198,8 +209,8 @@ def test_a_landing_beside_the_stand_moves_clear_of_it_first(late, seed):
     "text",
     [
         "mavlink_cut@pick+2.2",
-        "mavlink_cut@pick+2.45",
-        "mavlink_cut@pick+2.2:direction=to_autopilot",
+        longer("mavlink_cut@pick+2.45"),
+        longer("mavlink_cut@pick+2.2:direction=to_autopilot"),
     ],
 )
 def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
@@ -213,7 +224,7 @@ def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
 @pytest.mark.parametrize(
     "text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4", "mavlink_cut@take-off+0.4"]
 )
-@pytest.mark.parametrize("seed", [1, 2, 6])
+@pytest.mark.parametrize("seed", [1, longer(2), longer(6)])
 def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
     flight, series, figures = flown(text, seed=seed)
     assert classify(series, figures) == "failsafe" and not flight.armed
@@ -226,8 +237,8 @@ def test_a_take_off_without_sensors_ends_on_the_ground_and_disarmed(text, seed):
     [
         ("clock_jump@take-off:step=-0.219", 5, "failsafe"),  # 180 deg, 2.4 m/s
         ("clock_jump@take-off+1.434+1.0:step=-0.378", 3, "completed"),  # 1.3 m/s
-        ("clock_jump@take-off+0.4:step=0.2", 2, "failsafe"),
-        ("clock_jump@start:step=-0.15", 3, "failsafe"),  # 46 deg; now it does not take off
+        longer("clock_jump@take-off+0.4:step=0.2", 2, "failsafe"),
+        longer("clock_jump@start:step=-0.15", 3, "failsafe"),  # 46 deg; now it does not take off
     ],
 )
 def test_poses_of_a_wrong_clock_are_missing_poses(text, seed, outcome):
@@ -377,7 +388,7 @@ def test_a_link_that_becomes_slower_than_the_margin_is_left_before_the_vehicle_s
     ]
 
 
-@pytest.mark.parametrize("plant", ["calm", "laboratory"])
+@pytest.mark.parametrize("plant", ["calm", longer("laboratory")])
 def test_a_delay_that_begins_in_flight_is_measured_and_left_beyond_the_margin(plant):
     # TIMESYNC shows half of either, so that only the loop delay can start a reaction
     late = []

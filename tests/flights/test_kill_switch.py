@@ -4,6 +4,8 @@ The switch goes off again after 0.3 s and 1 s, while the stand-in is still armed
 after 6 s, when it has disarmed by itself.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
 from wired_flight import KILL_CHANNEL, wired_flight
@@ -19,6 +21,7 @@ from uam_sim_bridge.plant import Vehicle
 GROUND, TAKE_OFF, HOVER, CARRY = "waiting", "take-off", "approach", "carry"
 AFTER = {GROUND: 0.004, TAKE_OFF: 0.4, HOVER: 2.0, CARRY: 2.5}  # [s] in the phase
 ENGAGED = 0.3, 1.0, 6.0  # [s]
+IN_SHORT = {(GROUND, 1.0), (TAKE_OFF, 0.3), (HOVER, 6.0), (CARRY, 0.3)}  # each phase and each time
 
 
 def direct(scenario):
@@ -72,15 +75,26 @@ def assert_final(flight, heights, motors):
     assert last.event in (Event.STOPPED, Event.GIVEN_UP) and "kill switch" in last.cause
 
 
-@pytest.mark.parametrize("seconds", ENGAGED)
-@pytest.mark.parametrize("phase", [GROUND, TAKE_OFF, HOVER, CARRY])
+@pytest.mark.parametrize(
+    ("phase", "seconds"),
+    [
+        pytest.param(*case, marks=() if case in IN_SHORT else pytest.mark.long)
+        for case in product(AFTER, ENGAGED)
+    ],
+)
 def test_a_kill_is_final_also_when_the_switch_goes_off_again(phase, seconds):
     flight = direct("quick_pick")
     until(flight, phase)
     assert_final(flight, *press(flight, seconds))
 
 
-@pytest.mark.parametrize(("phase", "seconds"), [(GROUND, 0.3), (HOVER, 0.3), (HOVER, 6.0)])
+@pytest.mark.parametrize(
+    ("phase", "seconds"),
+    [
+        (HOVER, 0.3),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in [(GROUND, 0.3), (HOVER, 6.0)]),
+    ],
+)
 def test_the_same_over_mavlink(phase, seconds):
     flight = wired("quick_pick")
     until(flight, phase)

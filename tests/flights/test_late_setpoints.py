@@ -32,7 +32,7 @@ def flown(folder, way, delay, seed, begin="start", reserve=0.0):
         return flight.wait().metrics
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_a_fast_zigzag_does_not_take_off_with_late_setpoints(tmp_path, seed):
     found = flown(tmp_path, 5.2, 0.028, seed)
     assert "that the reference stands" in found["abort_reason"]

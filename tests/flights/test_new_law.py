@@ -24,6 +24,12 @@ IN_PYTHON = "PidLaw.step = staticmethod(getattr(PidLaw.step, 'py_func', PidLaw.s
 RUN = "from uam_lab.cli.main import main\nsys.exit(main())\n"
 
 
+def chosen(place):
+    """Options of the law, the file of its parameter and the scenario in a folder."""
+    files = str(place / "part.yaml"), "--scenario", str(place / "short.yaml")
+    return "--controller", "pid", "--profile", *files
+
+
 def uam(*options, law=WITH_PID + IN_PYTHON):
     """Run `uam` with the law registered."""
     command = [sys.executable, "-c", law + RUN, *options]
@@ -32,12 +38,15 @@ def uam(*options, law=WITH_PID + IN_PYTHON):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The result folder of a short flight with it."""
+    """The result folder of a short flight with it; a file changes one parameter of its defaults.
+
+    The law has no profile whose name could stand before the file.
+    """
     place = tmp_path_factory.mktemp("pid")
     (place / "short.yaml").write_text(SHORT)
+    (place / "part.yaml").write_text("arm_controller: {ros__parameters: {kappa: [0.25, 0.25]}}")
     options = ("--engine", "direct", "--no-video", "--out", str(place / "out"))
-    scenario = ("--scenario", str(place / "short.yaml"))
-    flown = uam("fly", "--controller", "pid", *scenario, *options)
+    flown = uam("fly", *chosen(place), *options)
     assert flown.returncode == 0, flown.stdout + flown.stderr
     return place / "out"
 
@@ -51,8 +60,7 @@ def test_a_law_of_one_file_completes_a_flight(folder):
 @pytest.mark.long  # the law and the loop of a flight are compiled for it: a minute
 def test_its_compiled_step_flies_the_same(folder, tmp_path):
     options = ("--engine", "direct", "--no-report", "--out", str(tmp_path))
-    scenario = ("--scenario", str(folder.parent / "short.yaml"))
-    flown = uam("fly", "--controller", "pid", *scenario, *options, law=WITH_PID)
+    flown = uam("fly", *chosen(folder.parent), *options, law=WITH_PID)
     assert flown.returncode == 0, flown.stdout + flown.stderr
     one, other = (read(place / "timeseries.parquet") for place in (folder, tmp_path))
     np.testing.assert_array_equal(one.values, other.values)
@@ -66,40 +74,18 @@ def test_its_gains_are_recorded_one_per_axis(folder):
             assert np.isfinite(values).any() == (i <= axes)
 
 
-def test_the_parameters_flown_are_the_shared_ones_of_the_default_profile_and_its_own(folder):
+def test_the_parameters_flown_are_shared_ones_of_the_default_profile_its_own_and_the_files(folder):
     from uam_control.profiles.profile import load_profile
     from uam_control.settings.parameter_file import read_sections
 
     flown = read_sections(folder / "parameters.yaml")
-    for node, axes in (("position_controller", 3), ("arm_controller", 2)):
+    kappas = {"position_controller": [0.5] * 3, "arm_controller": [0.25] * 2}
+    for node, kappa in kappas.items():
         shared = load_profile("s500").section(node)
         for name in ("inertia", "lambda_1", "lambda_2"):
             assert flown[node][name] == shared[name]
-        assert flown[node]["kappa"] == [0.5] * axes
+        assert flown[node]["kappa"] == kappa
         assert "varpi" not in flown[node]
-
-
-def test_a_file_with_one_parameter_changes_that_one(tmp_path):
-    """The law has no profile whose name could stand before the file."""
-    from uam_control.settings.parameter_file import read_sections
-
-    part = tmp_path / "part.yaml"
-    part.write_text("arm_controller: {ros__parameters: {kappa: [0.25, 0.25]}}")
-    (tmp_path / "short.yaml").write_text(SHORT)
-    flown = uam(
-        *("fly", "--controller", "pid", "--profile", str(part), "--engine", "direct"),
-        *(
-            "--scenario",
-            str(tmp_path / "short.yaml"),
-            "--no-report",
-            "--out",
-            str(tmp_path / "out"),
-        ),
-    )
-    assert flown.returncode == 0, flown.stdout + flown.stderr
-    sections = read_sections(tmp_path / "out" / "parameters.yaml")
-    assert sections["arm_controller"]["kappa"] == [0.25, 0.25]
-    assert sections["position_controller"]["kappa"] == [0.5] * 3
 
 
 def test_the_report_calls_it_by_its_label(folder):

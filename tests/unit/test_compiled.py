@@ -20,7 +20,7 @@ from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 sets = load_scenario("pick_and_place"), load_profile({profile!r}), Vehicle.load()
 flight = DirectFlight(*sets, 0.2, 1)
-while flight.mission.output.time < 1.5:
+while flight.mission.output.time < 1.0:
     flight.advance(10, 10)
 print(json.dumps(flight.recording.values[flight.recording.count - 1].tolist()))
 """
@@ -35,7 +35,10 @@ def flown(profile: str, without_numba: bool) -> list:
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("profile", ["s500", "asmc1", "asmc2"])
+@pytest.mark.parametrize(
+    "profile",
+    ["s500", *(pytest.param(one, marks=pytest.mark.long) for one in ("asmc1", "asmc2"))],
+)
 def test_without_numba_a_flight_is_the_same_up_to_rounding(profile):
     fast, plain = flown(profile, False), flown(profile, True)
     np.testing.assert_allclose(fast, plain, rtol=1e-6, atol=1e-7)

@@ -152,6 +152,7 @@ def test_a_profile_of_another_vehicle_is_named_with_numbers(designed):
     assert "rad/s" in line or " ms" in line
 
 
+@pytest.mark.long  # ten seconds of a search
 def test_the_same_numbers_give_the_same_design(designed, tmp_path):
     assert main(["vehicle", "design", str(designed[0]), "--out", str(tmp_path)]) == 0
     for name in ("small_profile.yaml", "small_autopilot.yaml"):

@@ -62,7 +62,7 @@ class Bench:
         return fit_friction(record, 1, self.weight_at_90 * np.sin(record.position[:, 1]))
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(st.floats(0.85, 1.15), st.floats(0.05, 0.25), st.floats(0.02, 0.1), st.floats(0.3, 0.7))
 def test_the_parameters_of_the_servo_are_found(scale, coulomb, viscous, weight):
     bench = Bench(torque_constant=scale * NOMINAL, coulomb=coulomb, viscous=viscous, weight=weight)

@@ -396,7 +396,7 @@ HAPPENINGS = st.tuples(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(st.lists(HAPPENINGS, max_size=12))
 def test_a_reference_is_finite_and_never_jumps_for_any_events(happenings):
     flight = Flight("pick_and_place", armed_at=0.0)

@@ -108,6 +108,7 @@ def test_the_strengths_leave_the_stated_margins(study):
     assert found["proposed"].delay == pytest.approx(found["PD to the same margin"].delay, rel=1e-3)
 
 
+@pytest.mark.long
 def test_the_row_as_converged_has_the_margins_of_its_gains(study):
     """rho of 0.7 of the ceiling's: 1/(1 + 0.7 g) of PD's delay margin is a rough rule."""
     from uam_lab.experiments.study.run import margins
@@ -210,6 +211,7 @@ def test_a_wrong_study_is_refused_in_one_line(study, tmp_path, change, text):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.long
 def test_the_same_study_gives_the_same_numbers_and_continues(study, tmp_path, monkeypatch):
     """One short flight, twice: equal to the last digit; then without flying."""
     document = study.document | {

@@ -210,6 +210,7 @@ def test_the_area_of_the_front_never_falls_and_no_trial_surpasses_the_front(valu
         assert any(one.values[0] <= cost and one.values[1] >= margin for one in best)
 
 
+@pytest.mark.long
 def test_a_search_with_two_objectives_draws_its_front(tmp_path, capsys):
     space, out = write(tmp_path, delay_margin={"at_least": 0.05}), tmp_path / "out"
     command = ["tune", "--space", space, "--jobs", "1", "--evaluations", "2", "--out", str(out)]
@@ -247,6 +248,7 @@ def test_convergence_by_hand():
     assert convergence.in_words(curve[:1], 0).startswith("not converged")
 
 
+@pytest.mark.long
 def test_patience_ends_a_search_that_improves_no_more(tmp_path, capsys):
     # a knob that hardly moves: every evaluation costs nearly what the start costs
     varpi = load_profile("s500").sets["arm_controller"].varpi

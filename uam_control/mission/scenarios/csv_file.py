@@ -106,6 +106,8 @@ class _Table:
         numbers = np.array(self._table.numbers(self._written.values()))
         if len(numbers) < 2:
             raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
+        t = numbers[:, self._names.index("t")]
+        check_length(t[-1] - t[0], f"{file}: column t", LONGEST_FILE)  # before its pauses are made
         self._numbers, self._rows = self._with_pauses(numbers)
         backward = np.flatnonzero(np.diff(self.times) <= 0.0)
         if len(backward):
@@ -113,7 +115,6 @@ class _Table:
         for name in self._written.keys() - {"t"}:
             if (far := np.abs(self._column(name)) > LARGEST).any():
                 raise self.error(int(np.argmax(far)), name, f"beyond {LARGEST:g}")
-        check_length(self.times[-1] - self.times[0], f"{file}: column t", LONGEST_FILE)
         low = self.columns("position")[:, Z] <= 0.0
         if low.any():
             raise self.error(int(np.argmax(low)), "pz", "below the ground")
