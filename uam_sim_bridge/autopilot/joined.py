@@ -32,13 +32,8 @@ from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.autopilot_port import PortSteps
 from uam_control.stages.step import DECIDE, DONE
 from uam_sim_bridge.autopilot.commander import take_setpoint
-from uam_sim_bridge.autopilot.core import (
-    Autopilot,
-    AutopilotStatus,
-    CycleArrays,
-    fly_rates,
-    take_vision,
-)
+from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
+from uam_sim_bridge.autopilot.cycle import CycleArrays, fly_rates, take_vision
 from uam_sim_bridge.autopilot.late_messages import (
     POSE,
     RATES,

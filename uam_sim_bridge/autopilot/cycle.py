@@ -1,0 +1,131 @@
+"""The compiled cycle of the autopilot stand-in: rate loop, motors, and an external pose.
+
+All vectors are FRD and NED; times [s] are those of the sensor samples.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+from uam_control.setpoints.thrust_curve import inverse_curve
+from uam_sim_bridge.autopilot.autopilot_estimator import EstimatorArrays, fuse, predict
+from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
+from uam_sim_bridge.autopilot.loops.rate_control import (
+    INTEGRAL,
+    TORQUE,
+    UNALLOCATED,
+    filter_gyro,
+    rate_torque,
+)
+
+FARTHEST_VISION = 1e5  # m
+SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
+
+
+class RateLoop(NamedTuple):
+    """Parameters, state and output of the rate loop.
+
+    model_factor: THR_MDL_FAC; filters (7,), gains (5, 3), memory (7, 3): see `rate_control`; mixer
+    (rotors, 4) and its pseudo-inverse, inverse (4, rotors); motors (rotors,): output, 0..1.
+    """
+
+    model_factor: float
+    filters: np.ndarray
+    gains: np.ndarray
+    mixer: np.ndarray
+    inverse: np.ndarray
+    memory: np.ndarray
+    motors: np.ndarray
+
+
+@jit
+def control_tick(
+    gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray, loop: RateLoop
+) -> None:
+    """Run one cycle of the rate loop and write the motors.
+
+    gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust.
+    """
+    filters, gains, memory, motors = loop.filters, loop.gains, loop.memory, loop.motors
+    filter_gyro(gyro, dt, filters, memory)
+    if not armed:
+        for axis in range(3):
+            memory[INTEGRAL, axis] = 0.0
+            memory[TORQUE, axis] = 0.0
+            memory[UNALLOCATED, axis] = 0.0
+        for i in range(len(motors)):
+            motors[i] = 0.0
+        return
+    rate_torque(setpoint, dt, filters, gains, landed, memory)
+    drive_motors(setpoint[3], loop)
+
+
+@jit
+def drive_motors(thrust: float, loop: RateLoop) -> None:
+    """Write the motors for the torque in the loop's memory and a normalised thrust."""
+    torque = loop.memory[TORQUE]
+    allocate(torque, thrust, loop.mixer, loop.motors)
+    unallocated_torque(torque, loop.motors, loop.inverse, loop.memory[UNALLOCATED])
+    for i in range(len(loop.motors)):
+        loop.motors[i] = inverse_curve(loop.model_factor, loop.motors[i])
+
+
+@jit
+def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
+    """Return the norm of the quaternion of an external pose; 0 if the pose is not usable.
+
+    position (3,) [m, NED]; quaternion (4,) [w x y z].
+    """
+    for i in range(3):
+        if not abs(position[i]) < FARTHEST_VISION:  # true for NaN
+            return 0.0
+    squared = 0.0
+    for i in range(4):
+        squared += quaternion[i] * quaternion[i]
+    norm = math.sqrt(squared)
+    return norm if 0.5 < norm < 2.0 else 0.0
+
+
+class CycleArrays(NamedTuple):
+    """What `fly_rates` uses. setpoint (4,): body rates [rad/s, FRD], thrust; commander (1,): its
+    memory; numbers (1,): time [s] of the last cycle, NaN before the first; [s] without setpoints
+    and thrust beyond which a cycle is another one."""
+
+    loop: RateLoop
+    estimator: EstimatorArrays
+    setpoint: np.ndarray
+    commander: np.ndarray
+    numbers: np.ndarray
+
+
+@jit
+def fly_rates(a: CycleArrays, time: float, gyro: np.ndarray, accel: np.ndarray) -> bool:
+    """Do what `Autopilot.update` does in flight with body rates; False, and nothing, if more is to
+    be decided."""
+    m, commander = a.numbers[0], a.commander[0]
+    if time - commander.stream_last > m.loss_time or not a.setpoint[3] > m.low_thrust:
+        return False
+    dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - m.time))
+    m.time = commander.updated = time
+    predict(gyro, accel, time, dt, a.estimator)
+    control_tick(gyro, dt, True, False, a.setpoint, a.loop)
+    return True
+
+
+@jit
+def take_vision(
+    time: float, position: np.ndarray, quaternion: np.ndarray, age: float, arrays: EstimatorArrays
+) -> bool:
+    """Handle an external pose; False: refused as not usable.
+
+    position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: `age_by` its arrival.
+    """
+    norm = magnitude_of_usable(position, quaternion)
+    if norm == 0.0 or age == math.inf:
+        return False
+    fuse(position, quaternion / norm, time, age, arrays)
+    return True
