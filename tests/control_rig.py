@@ -3,8 +3,9 @@
 import numpy as np
 
 from uam_control.mission import load_scenario
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import OffboardSequence, Reported, Request
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.profiles.profile import load_profile
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.control_tick import ControlTick

@@ -4,9 +4,11 @@ import re
 
 import pytest
 
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.firmware import FIRMWARES, SEPARATOR
 from uam_control.offboard.modes import MavResult
-from uam_control.offboard.sequence import OffboardParameters, OffboardSequence, Request
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence
 from uam_sim_bridge.mavlink.telemetry.events import EventTexts
 
 PX4 = FIRMWARES["px4"]

@@ -5,7 +5,7 @@ import yaml
 
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.firmware import FIRMWARES
-from uam_control.offboard.sequence import OffboardParameters
+from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters

@@ -2,9 +2,11 @@
 
 import pytest
 
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.firmware import FIRMWARES, Firmware
 from uam_control.offboard.modes import MavCmd, Mode
-from uam_control.offboard.sequence import OffboardParameters, OffboardSequence, Request
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError

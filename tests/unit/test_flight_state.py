@@ -5,14 +5,10 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import (
-    OffboardParameters,
-    OffboardSequence,
-    Phase,
-    Reported,
-    Request,
-)
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.link.flight_state import SETTLING, FlightState
 
 TICK = 0.004  # [s]

@@ -7,8 +7,9 @@ import time
 import numpy as np
 import pytest
 
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import OffboardSequence, Request
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description

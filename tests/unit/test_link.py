@@ -8,11 +8,8 @@ from memory_transport import Memory
 
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import MavCmd, MavResult, Mode
-from uam_control.offboard.sequence import (
-    OffboardParameters,
-    OffboardSequence,
-    Phase,
-)
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.vehicle import load_description

@@ -20,7 +20,8 @@ from uam_control.offboard.autopilot_magnet import (
     AutopilotMagnetParameters,
 )
 from uam_control.offboard.modes import MavCmd, MavResult
-from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description

@@ -2,14 +2,10 @@
 
 import numpy as np
 
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavResult, Mode, Severity
-from uam_control.offboard.sequence import (
-    OffboardParameters,
-    OffboardSequence,
-    Phase,
-    Reported,
-    Request,
-)
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_sim_bridge.autopilot.core import Autopilot
 

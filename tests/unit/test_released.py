@@ -6,15 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavResult, Mode
-from uam_control.offboard.sequence import (
-    NEW_REPORTS,
-    OffboardParameters,
-    OffboardSequence,
-    Phase,
-    Reported,
-    Request,
-)
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import NEW_REPORTS, OffboardSequence, Phase
 
 PERIOD = 0.004
 OFFBOARD = Reported(True, True, Mode.OFFBOARD, Mode.OFFBOARD)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,57 +23,22 @@ from uam_control.coordinates import (
     Y,
     Z,
 )
-from uam_control.maths.compiled import borrowing
 from uam_control.maths.kept_tuple import bound
-from uam_control.maths.memory import Number, put, record
+from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import wrap_angle
+from uam_control.mission import rest
 from uam_control.mission.course import NEXT, Course, Cue
+from uam_control.mission.following import MOST, REAL, WHOLE, GuidanceArrays, publish
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
-from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
 from uam_control.mission.motion.segments import Segment, WayBack
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion, write_motions
-from uam_control.mission.plans import BASE, BOTH, HARDEST, PEAK, RAMP, Goal, Plan
+from uam_control.mission.plans import BASE, BOTH, HARDEST, PEAK, Goal, Plan
 from uam_control.mission.scenarios.route import SINK
 
 COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
-
-
-# following: number of the next of the motions ahead
-WHOLE, REAL = "following", "scenario_time gravity rate_max acceleration_max"
-MOST = 64  # motions ahead
-
-
-class GuidanceArrays(NamedTuple):
-    """reference, motion: of `Guidance`; motions (MOST, 5, 6 + n), times (MOST,) [s]: ahead, on the
-    path; drag (3,) [1/s]; numbers (1,): WHOLE, REAL."""
-
-    reference: np.ndarray
-    motion: np.ndarray
-    motions: np.ndarray
-    times: np.ndarray
-    drag: np.ndarray
-    numbers: np.ndarray
-
-
-@borrowing
-def publish(a: GuidanceArrays) -> None:
-    """Write the motion to the reference, with the attitude that it needs."""
-    m = a.numbers[0]
-    write_reference(a.motion, a.drag, m.gravity, m.rate_max, m.acceleration_max, a.reference)
-
-
-@borrowing
-def follow_path(a: GuidanceArrays) -> None:
-    """Write the next motion that `Guidance.look_ahead` has computed, and its reference."""
-    m = a.numbers[0]
-    m.scenario_time = a.times[m.following]
-    for row in range(len(a.motion)):
-        put(a.motions[m.following, row], a.motion[row])
-    m.following += 1
-    publish(a)
 
 
 def _unshifted(motion: np.ndarray) -> None:
@@ -312,7 +276,7 @@ class Guidance:
         acceleration [m/s^2]: in place of stop_acceleration. A descent ends: `stay` then sets the
         reference. A plan ends in a stop, too, on its curve.
         """
-        length = self._ramp_from(self.motion, acceleration=acceleration)
+        length = rest.ramp(self.motion, self.parameters, acceleration=acceleration)
         for plan in self._plans.values():
             plan.stop(stamp, length)
         self._take(Cue.STOP)
@@ -345,10 +309,10 @@ class Guidance:
         A brake comes to rest first, and so does the path, which a shift may still move.
         """
         if self._brake is not None:
-            rest = max(self._brake.end, self._clock.settled)
-            if stamp < rest or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
+            ends = max(self._brake.end, self._clock.settled)
+            if stamp < ends or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
                 if self._take(Cue.WAIT):
-                    self._due = max(rest, stamp)
+                    self._due = max(ends, stamp)
                 return
         if not self._take(Cue.RESTED if self.course is Course.REST else Cue.GO_ON):
             return
@@ -361,7 +325,7 @@ class Guidance:
             self._brake = None
             offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
             offset[:, ARM] = 0.0
-            self._return(stamp, offset)
+            self._away = rest.way_back(stamp, offset, self.parameters)
         if self._plans.pop(False, None) is not None or self._arm is not None:
             time = self._clock.at(self._due)[0]
             self._trajectory.write(time, self._path)
@@ -433,59 +397,19 @@ class Guidance:
             scale(path, self._rates)
         self.shift(path)
 
-    def _return(self, stamp: float, offset: np.ndarray) -> None:
-        """Let the offset (5, 6 + n) from the path decay to zero."""
-        p = self.parameters
-        way, speed = (float(np.linalg.norm(offset[row, POSITION])) for row in (CHI, CHI_DOT))
-        length = max(
-            p.stop_time,
-            WayBack.PEAK * way / p.travel_speed,
-            math.sqrt(WayBack.HARDEST * way / p.stop_acceleration),
-            2.0 * RAMP * speed / p.stop_acceleration,
-            WayBack.PEAK * abs(float(offset[CHI, YAW])) / p.turn_rate,
-        )
-        self._away = WayBack(stamp, offset, length)
-
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
-        p, now = self.parameters, self.motion
-        speed = float(np.linalg.norm(now[CHI_DOT, POSITION]))
+        p = self.parameters
         acceleration = p.stop_acceleration if self._brake is None else p.brake_acceleration
-        length = max(p.stop_time, 2.0 * RAMP * speed / acceleration)
-        goal, lengths = now[CHI] + now[CHI_DOT] * length / 2, np.full_like(now[CHI], length)
-        if stow:
-            goal[ARM] = self._stowed
-            lengths[ARM] = self._arm_length(self._stowed)
-        return goal, lengths
+        return rest.goal(self.motion, acceleration, p, self._stowed if stow else None)
 
     def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
         goal = self.motion[CHI].copy()
         goal[ARM] = angles
-        return Segment(stamp, self.motion, goal, np.full_like(goal, self._arm_length(angles)))
-
-    def _arm_length(self, angles: np.ndarray) -> float:
-        """Return the time [s] for the arm to reach `angles` [rad] within stow_rate.
-
-        A joint that moves away from them first stops. Its way back is longer by rate * time / 2,
-        and at the peak of the way back, midway, half of the rate away is left.
-        """
-        p, way = self.parameters, angles - self.motion[CHI, ARM]
-        away = np.clip(-np.sign(way) * self.motion[CHI_DOT, ARM], 0.0, p.stow_rate)
-        back = np.abs(way) + away * p.stop_time / 2
-        peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
-        return max(p.stop_time, PEAK * float(np.max(back / peak)))
+        length = rest.arm_length(self.motion, angles, self.parameters)
+        return Segment(stamp, self.motion, goal, np.full_like(goal, length))
 
     def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:
-        """Return the time [s] in which the path's clock stops or resumes; see `_ramp_from`."""
+        """Return the time [s] in which the path's clock stops or resumes; see `rest.ramp`."""
         self._trajectory.write(self.scenario_time, self._path)
-        return self._ramp_from(self._path, shortest, acceleration)
-
-    def _ramp_from(
-        self, motion: np.ndarray, shortest: float = math.inf, acceleration: float | None = None
-    ) -> float:
-        """Return the time [s] to stop from motion (5, 6 + n) within stop_acceleration.
-
-        shortest [s]: in place of a longer stop_time; acceleration [m/s^2]: of stop_acceleration.
-        """
-        p, speed = self.parameters, float(np.linalg.norm(motion[CHI_DOT, POSITION]))
-        return max(min(shortest, p.stop_time), RAMP * speed / (acceleration or p.stop_acceleration))
+        return rest.ramp(self._path, self.parameters, shortest, acceleration)

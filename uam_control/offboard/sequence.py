@@ -31,21 +31,14 @@ nothing is sent until the autopilot's reports are new again: `begin`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from uam_control.maths.memory import Number, record
-from uam_control.offboard.firmware import PX4, Firmware, firmware
-from uam_control.offboard.modes import (
-    FORCE,
-    MavCmd,
-    MavResult,
-    Mode,
-    Severity,
-    result_word,
-)
-from uam_control.settings.parameter_set import ParameterSet, integer, number, switch, text
+from uam_control.offboard.exchange import Reported, Request, commands_of
+from uam_control.offboard.firmware import firmware
+from uam_control.offboard.modes import MavResult, Mode, Severity, result_word
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.reasons import Reasons
 from uam_control.settings.plain_members import plain_members
 
 LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T
@@ -58,7 +51,6 @@ KILLED = "kill engaged"  # PX4's text; the heartbeat, once a second, misses a sh
 BY_SWITCH = "the pilot's kill switch has stopped the motors"
 BY_TERMINATION = "flight termination has stopped the motors"
 REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
-_KEPT_REASONS = 5
 
 
 @plain_members
@@ -76,79 +68,6 @@ class Phase(Enum):
     FAILED = "failed"
 
 
-@plain_members
-class Request(Enum):
-    """A request to the autopilot; the value is the text for logs."""
-
-    OFFBOARD = "OFFBOARD"
-    ARM = "arming"
-    DISARM = "disarming"
-    KILL = "stopping the motors"
-
-
-def commands_of(spoken: Firmware) -> dict[Request, tuple[MavCmd, tuple[float, ...]]]:
-    """Return the requests as COMMAND_LONG: command, first parameters."""
-    return {
-        Request.OFFBOARD: (MavCmd.DO_SET_MODE, spoken.mode_request(Mode.OFFBOARD)),
-        Request.ARM: (MavCmd.ARM_DISARM, (1.0, 0.0)),
-        Request.DISARM: (MavCmd.ARM_DISARM, (0.0, 0.0)),
-        Request.KILL: (MavCmd.ARM_DISARM, (0.0, FORCE)),
-    }
-
-
-class Reported(NamedTuple):
-    """The autopilot's state as last received.
-
-    connected: the last heartbeat is recent. intended: the mode that was chosen last by a person or
-    a companion (CURRENT_MODE.intended_custom_mode), UNKNOWN without that message. failsafe: the
-    autopilot flies its own failsafe (HEARTBEAT.system_status CRITICAL). delivered [s]: when the
-    newest message was sent that certainly arrived. killed: the kill switch or flight termination
-    holds the motors (HEARTBEAT.system_status FLIGHT_TERMINATION).
-    """
-
-    connected: bool
-    armed: bool
-    mode: Mode
-    intended: Mode = Mode.UNKNOWN
-    failsafe: bool = False
-    delivered: float = math.inf
-    killed: bool = False
-
-
-@dataclass(frozen=True)
-class OffboardParameters(ParameterSet):
-    """What the autopilot speaks, times and numbers of attempts of the sequence."""
-
-    firmware: str = text(
-        PX4, "firmware of the autopilot, fixed once the node runs", "a name of FIRMWARES"
-    )
-    stream_time: float = number(
-        1.0, "time of streaming setpoints before the first request for OFFBOARD", "s", 0.0, 30.0
-    )
-    retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
-    attempts: int = integer(40, "requests without success before giving up", 1, 10000)
-    return_after_lost_link: bool = switch(
-        False,
-        "request OFFBOARD again after the autopilot's failsafe for a lost stream of setpoints; "
-        "never against a mode that a person chose",
-    )
-    reason_delay: float = number(
-        5.0,
-        "time for which a reason must last that the autopilot also gives in a normal start or "
-        "landing (passing.yaml of the firmware)",
-        "s",
-        0.0,
-        60.0,
-    )
-    recovery_attempts: int = integer(
-        6, "requests of return_after_lost_link in a whole flight", 0, 10000
-    )
-
-    def check_together(self) -> None:
-        """Raise ParameterError for an unknown firmware."""
-        firmware(self.firmware)
-
-
 _BEGIN_AND_END = (
     *(Phase.WAITING, Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING),
     *(Phase.DISARMING, Phase.DISARMED),
@@ -160,9 +79,8 @@ _KEPT_WITHOUT_LINK = (Phase.FLYING, Phase.RELEASED, Phase.FAILED, Phase.DISARMIN
 class OffboardSequence:
     """The state machine.
 
-    `phase`; `reasons`: the autopilot's answers to refused requests, with advice, newest last;
-    `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when the
-    autopilot must run its own failsafe; OFFBOARD is then requested no more. `failure`: why the
+    `phase`; `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when
+    the autopilot must run its own failsafe; OFFBOARD is then requested no more. `failure`: why the
     sequence has given up, else ""; `stopped`: the motors must stay still until the next flight;
     `commands`: each request as command and first parameters, in the words of `firmware`.
     """
@@ -174,7 +92,7 @@ class OffboardSequence:
         self.firmware = firmware(self.parameters.firmware)
         self.commands = commands_of(self.firmware)
         self.phase = Phase.WAITING
-        self.reasons: tuple[str, ...] = ()
+        self._reasons = Reasons(self.firmware)
         self.released_to = self.failure = ""
         self.let_go = self.stopped = False
         self._desired = False  # armed
@@ -199,7 +117,11 @@ class OffboardSequence:
         self._late = 0.0  # [s] for which the tick that began last has waited
         self._stop: Request | None = None  # repeated until the vehicle is disarmed
         self._halted = math.inf  # [s] since when
-        self._passing: dict[str, float] = {}  # reason that may pass → [s] since when
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The autopilot's answers to refused requests, with advice, newest last."""
+        return self._reasons.told
 
     @property
     def settled(self) -> bool:
@@ -229,7 +151,7 @@ class OffboardSequence:
         if armed == self._desired:
             return
         self._desired = armed
-        self._forget()
+        self._reasons.forget()
         self._attempts, self._asked = 0, -math.inf
         self._returns, self._regain_requests = 0, 0
         if armed:
@@ -369,7 +291,7 @@ class OffboardSequence:
         if self._in_flight:  # the phase is FAILED if a heartbeat reported "disarmed" before
             self._fail("the autopilot rebooted in flight")
         elif self.phase in (Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING):
-            self._reason("the autopilot rebooted")
+            self._reasons.add("the autopilot rebooted")
             self.phase, self._stream_start = Phase.STREAMING, time
 
     def answer(self, request: Request, result: int) -> None:
@@ -387,25 +309,17 @@ class OffboardSequence:
             self._lasting_reason(text.strip())
 
     def _lasting_reason(self, text: str) -> None:
-        """Add a reason; one that may pass only if it has lasted for `reason_delay`."""
+        """Add a reason, at begin and end of a flight only if it lasts for `reason_delay`."""
+        if self.phase not in _BEGIN_AND_END:
+            self._reasons.add(text)
+            return
         streaming = self.phase not in (Phase.WAITING, Phase.STREAMING)
-        if self.firmware.passing(text, streaming) and self.phase in _BEGIN_AND_END:
-            since = self._passing.setdefault(text, self._time)
-            if self._time - since < self.parameters.reason_delay:
-                return
-        self._reason(text)
-
-    def _forget(self) -> None:
-        """Discard all reasons: their cause is over."""
-        self.reasons = ()
-        self._passing.clear()
+        self._reasons.add_lasting(text, self._time, streaming, self.parameters.reason_delay)
 
     def _fail(self, text: str) -> None:
         """End in FAILED with the reasons so far, also those that might have passed, and `text`."""
-        for earlier in self._passing:
-            self._reason(earlier)
-        self._passing.clear()
-        self._reason(text)
+        self._reasons.add_all()
+        self._reasons.add(text)
         self.failure = "; ".join(self.reasons) if self.phase in _BEGIN_AND_END else text
         self.phase = Phase.FAILED
 
@@ -413,11 +327,6 @@ class OffboardSequence:
     def _has_motors(self) -> bool:
         """Whether motors turn, or may turn at once, that this sequence has asked for."""
         return self._in_flight or self.phase is Phase.ARMING
-
-    def _reason(self, text: str) -> None:
-        text = self.firmware.with_advice(text)
-        others = tuple(reason for reason in self.reasons if reason != text)
-        self.reasons = (*others, text)[-_KEPT_REASONS:]
 
     def _left_offboard(self, time: float, seen: Reported) -> bool:
         """Return whether the autopilot has left OFFBOARD by now, which it had entered before.
@@ -455,7 +364,7 @@ class OffboardSequence:
             Phase.FAILED,
         ):
             self.phase, self._in_flight = Phase.DISARMED, False
-            self._forget()
+            self._reasons.forget()
             self.released_to, self._offboard_since = "", None
         elif self.phase is Phase.ARMING and time - self._arm_asked < ARMING_UNDERWAY:
             pass  # a vehicle that is armed now is ours
@@ -465,7 +374,7 @@ class OffboardSequence:
 
     def _fly(self) -> None:
         self.phase, self._attempts, self.failure = Phase.FLYING, 0, ""
-        self._forget()
+        self._reasons.forget()
         self.released_to, self._in_flight, self._regain_requests = "", True, 0
 
     def _keep_flying(self, time: float, seen: Reported, away: bool) -> None:
@@ -489,7 +398,7 @@ class OffboardSequence:
         self.failure = self.failure if self.stopped else ""
         self._person = False
         self.released_to = self._holder(seen)
-        self._reason(f"left OFFBOARD: {self.released_to}, has control")
+        self._reasons.add(f"left OFFBOARD: {self.released_to}, has control")
 
     def _holder(self, seen: Reported) -> str:
         """Return who has control, and in which mode, in one line.

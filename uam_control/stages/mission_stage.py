@@ -11,7 +11,7 @@ import numpy as np
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Number, record
 from uam_control.mission import Mission
-from uam_control.mission.guidance import MOST
+from uam_control.mission.following import MOST
 from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
 from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import REPORT_DELAY

@@ -18,13 +18,9 @@ from uam_control.ages import DISCONNECTED, age_by
 from uam_control.frames import swap_quaternion, swap_sample, swap_world
 from uam_control.maths.compiled import borrowing, jit, prepared
 from uam_control.maths.memory import Flag, Number, record
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavResult, Severity
-from uam_control.offboard.sequence import (
-    LINK_GAP,
-    OffboardSequence,
-    Reported,
-    Request,
-)
+from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
 from uam_control.setpoints.attitude_target import RATES as RATES_ALONE
 from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.kinds.desired import Target

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from uam_control.ages import STALE
 from uam_control.estimation.estimator_parameters import PoseSourceParameters
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
-from uam_control.offboard.sequence import OffboardParameters
+from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.profiles.profile import BRIDGE, Profile
 from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.level_hold import HoldParameters

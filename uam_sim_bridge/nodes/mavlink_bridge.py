@@ -25,7 +25,8 @@ from std_srvs.srv import Trigger
 from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.pose_source import PoseSource
-from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.kinds.catalogue import SETPOINTS, SetpointParameters
 from uam_control.setpoints.kinds.desired import Desired
 from uam_control.setpoints.level_hold import HoldParameters

@@ -11,7 +11,8 @@ from typing import Any
 
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
-from uam_control.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_control.offboard.offboard_parameters import OffboardParameters
+from uam_control.offboard.sequence import OffboardSequence
 from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.control_tick import ControlTick

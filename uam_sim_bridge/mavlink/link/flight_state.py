@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import Request
 
 SETTLING = 0.1  # s after an accepted request in which a report may be older than the answer
 ARMED = {Request.ARM: True, Request.DISARM: False, Request.KILL: False}
