@@ -69,7 +69,24 @@ def test_entries_replace_the_usual_ones(tmp_path):
     names = [model.body(i).name for i in range(model.nbody)]
     assert "box" in names and "stand" not in names and "drop_mat" not in names
     assert model.body("payload").pos[0] == 50.0  # out of sight: nobody asked for one
-    assert scenario(tmp_path, []).surroundings == {}
+
+
+def test_an_empty_list_is_an_empty_room_and_no_list_the_usual_one(tmp_path):
+    model = compiled(tmp_path, [])
+    names = {model.body(i).name for i in range(model.nbody)}
+    assert not names & {"stand", "drop_mat"} and model.body("payload").pos[0] == 50.0
+    assert scenario(tmp_path, None).surroundings == {}
+
+
+def test_a_handle_stands_on_the_payload_and_weighs_nothing(tmp_path):
+    """Box of 0.1 m, stem of 0.2 m: its middle is 0.05 + 0.1 m above that of the box."""
+    size = {"size": [0.1, 0.1, 0.1], "handle": [0.02, 0.03, 0.2]}
+    model = compiled(tmp_path, [{"kind": "payload", "position": [2, 0]} | size])
+    stem = model.geom("payload_handle")
+    assert stem.pos == pytest.approx([0.0, 0.0, 0.15])
+    assert stem.size == pytest.approx([0.01, 0.015, 0.1])
+    assert stem.contype == model.geom("payload").contype and model.body("payload").mass == 0.2
+    assert model.body("payload").ipos == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_a_vehicle_file_from_before_loses_its_own_surroundings(tmp_path):

@@ -36,6 +36,15 @@ def test_the_vehicle_derives_from_the_s500():
     assert load_description("t650").gripper.kind == "none"
 
 
+def test_jaws_that_move_weigh_as_much_as_the_rigid_ones():
+    """Fingers of 22 g in place of jaws of 22 g: the last link of t650 stays 0.2495 kg."""
+    rigid, moving = (load_description(name) for name in ("t650", "t650_gripper"))
+    assert moving.mass == rigid.mass == 3.746174 and moving.gripper.opening == (0.019, 0.038)
+    for of in map(chain_of, (rigid, moving)):
+        assert of.masses[-1] == pytest.approx(0.2495176)
+        assert of.centres[-1] == pytest.approx([-0.005467, 0.001698, -0.039619], abs=1e-8)
+
+
 def test_the_tip_is_where_the_parts_say():
     """link_2 begins 0.173 m below the base; the gripper 0.1 m below it, its tip 0.108 m further."""
     chain: Chain = chain_of(S500)

@@ -161,7 +161,8 @@ def test_joints_sweep_while_a_curve_is_flown(tmp_path):
 def test_every_scenario_of_the_library_is_smooth(name):
     from uam_control.vehicle import load_description
 
-    vehicle = load_description("s500_arm3" if "arm3" in name else "s500_arm")
+    flown_by = {"arm3_motions": "s500_arm3", "circle_arm3": "s500_arm3", "pillars": "t650_gripper"}
+    vehicle = load_description(flown_by.get(name, "s500_arm"))
     scenario = load_scenario(name, vehicle)
     start = standing(scenario.arm_start)
     trajectory, end = scenario.trajectory(start), scenario.landing.at + scenario.landing.duration

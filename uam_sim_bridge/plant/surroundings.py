@@ -64,16 +64,13 @@ def _add_payload(world: mujoco.MjsBody, name: str, entry: Entry, mass: float) ->
     )
     body.add_freejoint(name=name)
     made = material(entry["material"])
-    body.add_geom(
-        name=name,
-        type=TYPES.mjGEOM_BOX,
-        size=half,
-        mass=mass,
-        contype=LOAD,
-        conaffinity=LOAD_WITH,
-        rgba=made["rgba"],
-        friction=made["friction"],
-    )
+    look = {"rgba": made["rgba"], "friction": made["friction"]}
+    solid = look | {"type": TYPES.mjGEOM_BOX, "contype": LOAD, "conaffinity": LOAD_WITH}
+    body.add_geom(name=name, size=half, mass=mass, **solid)
+    if handle := entry.get("handle"):
+        stem = [0.5 * length for length in handle]
+        top = [0.0, 0.0, half[2] + stem[2]]
+        body.add_geom(name=f"{name}_handle", size=stem, pos=top, mass=0.0, **solid)
     body.add_geom(
         name=f"{name}_plate",
         type=TYPES.mjGEOM_BOX,

@@ -31,7 +31,7 @@ def default_environment() -> tuple[dict[str, Any], ...]:
     """Return the entries of a scenario that has none of its own."""
     where = f"{configuration.path('environment.yaml')}:"
     top = Section({ENVIRONMENT: _catalogue()["default"]}, where, ScenarioError)
-    return read_environment(top)
+    return read_environment(top) or ()
 
 
 def usual_load() -> float:
@@ -49,12 +49,15 @@ def thickness(part: str) -> float:
     return _catalogue()["parts"][part]
 
 
-def read_environment(top: Section) -> tuple[dict[str, Any], ...]:
-    """Return the checked entries of `environment`, with usual values for what they leave out.
+def read_environment(top: Section) -> tuple[dict[str, Any], ...] | None:
+    """Return the checked entries of `environment`, with usual values for what they leave out; None
+    if it is left out itself.
 
     Every entry has kind, name, position (3,) [m] of the middle of its lower side, yaw_deg and the
     keys of its kind. Raises the section's error.
     """
+    if top.values.get(ENVIRONMENT) is None:
+        return None
     found: list[dict[str, Any]] = []
     for entry in top.entries(ENVIRONMENT, True):
         kind = entry.one_of("kind", tuple(_catalogue()["kinds"]))
@@ -81,8 +84,8 @@ def _name(entry: Section, kind: str, before: Sequence[dict[str, Any]]) -> str:
 
 def _value(entry: Section, key: str, usual: Any) -> Any:
     """Return an entry of the same form as its usual value."""
-    if key == "size":
-        value = list(entry.numbers(key, len(usual), default=tuple(usual)))
+    if key in ("size", "handle"):
+        value = list(entry.numbers(key, len(usual) or 3, default=tuple(usual)))
         if not all(0.0 < one <= FARTHEST for one in value):
             raise entry.error(key, f"{value}: lengths above 0, at most {FARTHEST:g} m")
         return value

@@ -84,7 +84,7 @@ class Scenario:
     grip: what the gripper does along a route that is the whole flight; approaches: (time of a grip,
     how the tool comes to the payload) where it is not from above.
     notes: for the user, about the file. environment: what stands around in simulation, see
-    `environment`; (): the usual.
+    `environment`; None: the usual.
     """
 
     name: str
@@ -101,14 +101,14 @@ class Scenario:
     snapshots: tuple[tuple[float, str], ...] = field(default=())
     faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
     notes: tuple[str, ...] = ()
-    environment: tuple[dict[str, Any], ...] = ()
+    environment: tuple[dict[str, Any], ...] | None = None
     grip: Grip | None = None
     approaches: tuple[tuple[float, Approach], ...] = ()
 
     @property
     def surroundings(self) -> dict[str, Any]:
         """Return the change of the plant's numbers that this scenario makes."""
-        return {"environment": list(self.environment)} if self.environment else {}
+        return {} if self.environment is None else {"environment": list(self.environment)}
 
     @property
     def motions(self) -> tuple[Move, ...]:

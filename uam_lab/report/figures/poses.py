@@ -22,7 +22,7 @@ class Poses:
     def __init__(self, series: Series):
         mass = series.info.get("payload_mass_kg") or 0.0
         self.series = series
-        around = {key: series.info[key] for key in (ENVIRONMENT,) if series.info.get(key)}
+        around = {key: series.info[key] for key in (ENVIRONMENT,) if key in series.info}
         vehicle = Vehicle.load(series.info.get("vehicle") or DEFAULT_VEHICLE)
         self.vehicle = vehicle.changed(around)
         self.model = self.vehicle.compile(mass)
