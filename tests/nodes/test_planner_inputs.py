@@ -191,12 +191,13 @@ def test_the_hand_is_commanded_by_pose_trajectory_and_twist(vehicle):
     )
 
     for _ in range(30):  # 20 Hz
-        assert answer(vehicle, topics.END_EFFECTOR_TWIST, twist("end_effector", 0.1)).startswith(
-            "acc"
-        )
+        text = answer(vehicle, topics.END_EFFECTOR_TWIST, twist("end_effector", 0.1))
+        assert text.startswith("accepted: slowed down to 0.0175 m/s, 0 rad/s"), text
         vehicle.fly(12)
-    assert vehicle.state[1, :2] == pytest.approx([0.1 * c, 0.1 * s], abs=2e-3)
-    vehicle.fly(113)  # with the last 12 ticks 0.5 s
+    assert vehicle.state[1, :2] == pytest.approx([0.0175 * c, 0.0175 * s], abs=5e-4)
+    vehicle.fly(63)  # with the last 12 ticks 0.3 s
+    assert np.hypot(*vehicle.state[1, :2]) < 5e-3
+    vehicle.fly(40)
     assert not vehicle.state[1].any()
 
     x, y, z = vehicle.state[0, :3] + [0.14 * c, 0.14 * s, -0.203]

@@ -342,7 +342,7 @@ class FlightSequence:
                 hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
                 return False, f"refused: {error}{hint}"
             self._ask_for(goal)
-        return True, f"accepted: at the end in {max(0.0, made.end - self._stamp):.1f} s"
+        return True, f"accepted: {goal.note}at the end in {max(0.0, made.end - self._stamp):.1f} s"
 
     def _ask_for(self, goal: Goal) -> None:
         """Queue a goal for the next step, in place of one that waits for it."""

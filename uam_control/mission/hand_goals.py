@@ -21,7 +21,6 @@ from uam_control.mission.motion.flyer import Flyer, flattened
 from uam_control.mission.plan_limits import room
 from uam_control.mission.plans import (
     BOTH,
-    RAMP,
     SAME,
     Blend,
     Goal,
@@ -37,9 +36,11 @@ TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
 FAR = 100.0  # [m] from the base's room: no arm is as long
 INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
-# of the way at full speed, in which a jog stops: the quintic of 0.4 ends without jerk, so gently
-SHARE = 0.4
-MISTAKEN = 10.0  # times the limit of a jog, beyond which a velocity is in another unit
+# A jog stops in SHARE of the way at full speed, BENT of length^2 times its acceleration, and
+# STEEPEST times the mean one: the quintic that ends without jerk, so gently.
+SHARE, BENT, STEEPEST = 0.4, 0.05, 16 / 9
+MISTAKEN = 1.0, 2.0  # [m/s, rad/s] beyond which the velocity of a jog is in another unit
+SLOWER = 0.99  # share of what is asked for, below which the answer tells it
 ROUNDS = 3  # of the base's tilt, which follows from its own motion
 PLACE = slice(0, HEADING + 1)  # of TOOL: x y z heading
 
@@ -168,8 +169,8 @@ class HandTwist(Goal):
             raise PlanRefused("a velocity is not finite")
         tool = tools(self.flyer.chain, reference[[CHI]])[0]
         linear, angular = given @ _axes(tool).T if self.of_tool else given
-        linear = _limited(linear, p.jog_speed, "m/s")
-        angular = _limited(angular, p.jog_turn_rate, "rad/s")
+        linear = _limited(linear, p.jog_speed, MISTAKEN[0], "m/s")
+        angular = _limited(angular, p.jog_turn_rate, MISTAKEN[1], "rad/s")
         rates = np.array([*linear, *_tool_rates(tool, angular)])
         lowest = tool[Z] + rates[Z] * (p.jog_hold + p.jog_stop)
         if rates[Z] < 0.0 and lowest < p.hand_floor:
@@ -177,12 +178,24 @@ class HandTwist(Goal):
         found, missed = turning(self.flyer.chain, reference[CHI], rates)
         if np.abs(missed).max() > CLOSE + TURNED_BY * np.abs(rates[HEADING:]).max():
             raise PlanRefused("out of reach: the arm cannot turn the tool so")
+        share = min(1.0, p.jog_speed / max(float(np.linalg.norm(found[POSITION])), p.jog_speed))
+        found *= share
         if np.abs(found[ARM]).max(initial=0.0) > p.plan_joint_rate:
             worst = np.abs(found[ARM]).max()
             raise PlanRefused(
                 f"singular: a joint would turn at {worst:.2f} rad/s, allowed {p.plan_joint_rate:g}"
             )
-        return Jog(found, self)
+        return Jog(found, self, self._slowed(share * linear, share * angular))
+
+    def _slowed(self, linear: np.ndarray, angular: np.ndarray) -> str:
+        """Say how much slower than asked for the jog is, or ""."""
+        asked = math.hypot(*self.linear), math.hypot(*self.angular)
+        given = math.hypot(*linear), math.hypot(*angular)
+        if all(now >= SLOWER * before for now, before in zip(given, asked, strict=True)):
+            return ""
+        return (
+            f"slowed down to {given[0]:.3g} m/s, {given[1]:.2g} rad/s, so that it stops in time; "
+        )
 
 
 @dataclass(frozen=True)
@@ -191,6 +204,7 @@ class Jog(Goal):
 
     rates: np.ndarray
     asked: HandTwist
+    note: str = ""
     columns = BOTH
 
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
@@ -202,8 +216,9 @@ class Jog(Goal):
             abs(change[YAW]) / p.plan_yaw_acceleration,
             np.abs(change[ARM]).max(initial=0.0) / p.plan_joint_acceleration,
         )
-        blend = Blend(start.copy(), max(stop, RAMP * float(max(bends))))
-        begin = start[CHI] + change * blend.length / 2 + start[CHI_DDOT] * blend.length**2 / 12
+        blend = Blend(start.copy(), max(stop, STEEPEST * float(max(bends))))
+        begin = start[CHI] + SHARE * change * blend.length
+        begin += BENT * start[CHI_DDOT] * blend.length**2
         points = np.zeros((CHI_DDOT + 1, 3, len(rates)))
         points[CHI] = begin + np.outer([0.0, hold, hold + SHARE * stop], rates)
         points[CHI_DOT, :2] = rates
@@ -270,11 +285,11 @@ def _differentiate(times: np.ndarray, rows: np.ndarray) -> None:
         rows[row, [0, -1]] = 0.0
 
 
-def _limited(velocity: np.ndarray, most: float, unit: str) -> np.ndarray:
+def _limited(velocity: np.ndarray, most: float, mistaken: float, unit: str) -> np.ndarray:
     """Return a velocity (3,), slowed down to `most`; raise PlanRefused for one in another unit."""
     size = math.hypot(*velocity)
-    if size > MISTAKEN * most:
-        raise PlanRefused(f"too fast: {size:.3g} {unit}, {MISTAKEN * most:g} {unit} allowed")
+    if size > mistaken:
+        raise PlanRefused(f"too fast: {size:.3g} {unit}, {mistaken:g} {unit} allowed")
     return velocity * (most / max(size, most))
 
 

@@ -55,10 +55,11 @@ class PlanLimits(ParameterSet):
 
 @dataclass(frozen=True)
 class HandLimits(ParameterSet):
-    """Limits of what the end effector is commanded, in addition to those of plans."""
+    """Limits of what the end effector is commanded, in addition to those of plans. Without a value
+    in the profile speed, turn rate and stop of a jog follow from the attitude law: `jog_limits`."""
 
     hand_floor: float = number(0.0, "lowest height of the hand's goals", "m", -1e4, 1e4)
-    jog_speed: float = number(0.1, "largest speed of a jog", "m/s", 0.01, 1.0)
+    jog_speed: float = number(0.1, "largest speed of hand and base in a jog", "m/s", 1e-3, 1.0)
     jog_turn_rate: float = number(0.2, "largest turn rate of a jog", "rad/s", 0.01, 2.0)
     jog_acceleration: float = number(
         0.5, "largest acceleration when the speed of a jog changes", "m/s^2", 0.05, 5.0

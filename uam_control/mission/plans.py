@@ -187,6 +187,7 @@ class Goal:
     columns: slice
     closed = False
     still = False  # whether it asks for no motion, so that it only ends one
+    note = ""  # of the answer, what is changed of what was asked for
 
     def solved(self, reference: np.ndarray, p: MissionParameters, ground: float) -> Goal:
         """Return the goal in coordinates of base and arm, from reference (3, 6 + n) on.

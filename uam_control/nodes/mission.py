@@ -84,6 +84,9 @@ class StateWatch(ParameterSet):
     )
 
 
+OF_LAWS = ("inertia", "lambda_1", "lambda_2")  # on which limits of the reference depend
+
+
 class MissionNode(UamNode):
     """For each state, publishes the reference of the next tick and the magnet of this tick.
 
@@ -150,7 +153,7 @@ class MissionNode(UamNode):
         bases = []
         for controller, (limits, _) in list(CONTROLLERS.items())[:2]:
             given = neighbour_section(self, controller)
-            known = {name: given[name] for name in (*limits.specs(), "inertia") if name in given}
+            known = {name: given[name] for name in (*limits.specs(), *OF_LAWS) if name in given}
             bases.append(replace(profile.sets[controller], **known).validated(AXES))
         bridge = neighbour_section(self, BRIDGE) or profile.section(BRIDGE)
         return reference_limits(*bases, bridge)

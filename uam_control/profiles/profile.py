@@ -11,6 +11,7 @@ output of `ros2 param dump` for the nodes of a flight is a profile, too.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass, replace
 from difflib import get_close_matches
@@ -52,6 +53,9 @@ LIKE = 0.85  # likeness of a name that means one of them
 # shares that a reference may need: of the bridge's largest body rates; of the acceleration that the
 # attitude law's largest torque gives
 FOLLOWED, TURNED = 0.9, 0.75
+# rates of the hand that count as rest, [s] after the last message of a jog
+RESTING, RESTS_AFTER = {"jog_speed": 0.005, "jog_turn_rate": math.radians(1.0)}, 0.3
+STOPS = 3.0  # times the time constant of the attitude: a stop that it follows
 # of the process of every node
 PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
@@ -261,7 +265,24 @@ def reference_limits(
     if inertia := getattr(attitude, "inertia", ()):  # laws of users may have none
         turns = np.divide(attitude.torque_max, inertia)[: YAW - ROLL]
         limits["reference_turn"] = TURNED * float(turns.min())
-    return limits
+    return limits | jog_limits(attitude)
+
+
+def jog_limits(attitude: AttitudeLimits) -> dict[str, float]:
+    """Return speeds and stop of a jog after which the hand rests in time.
+
+    A base stops by its tilt. Slower stops of it come too late, quicker ones swing the hand. What is
+    left of the speed falls with the square of the attitude's bandwidth (docs/end_effector.md).
+    """
+    first, second = (getattr(attitude, f"lambda_{i}", ()) for i in (1, 2))
+    if not first or not second:  # laws of others have other gains
+        return {}
+    bandwidth, p = float(np.divide(first, second)[: YAW - ROLL].min()), MissionParameters
+    times = (bandwidth * (RESTS_AFTER - p.jog_hold)) ** 2
+    found = {name: min(times * rest, getattr(p, name)) for name, rest in RESTING.items()}
+    found["jog_stop"] = STOPS / bandwidth
+    bounds = {name: p.specs()[name] for name in found}
+    return {name: min(max(found[name], one.low), one.high) for name, one in bounds.items()}
 
 
 def profile_of(
