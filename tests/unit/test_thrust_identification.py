@@ -199,7 +199,7 @@ tick = st.tuples(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(tick, min_size=1, max_size=60))
 def test_whatever_comes_in_the_factor_stays_within_bounds_and_slew(ticks):
     identification = ThrustIdentification()

@@ -74,8 +74,8 @@ class StateEstimator(Estimator):
 
     Pass the samples by `mocap`, `imu` and `joints` as they arrive. Poses and readings wait for the
     next IMU sample or `update`, and are then used in the order of their stamps. `update` returns
-    the state at the stamp of the newest IMU sample. `imu_update` is both, in less time. `arrays`:
-    the whole state; they are never replaced.
+    the state at the stamp of the newest IMU sample. `arrays`: the whole state; they are never
+    replaced.
     """
 
     kind = EstimatorParameters
@@ -116,18 +116,6 @@ class StateEstimator(Estimator):
         return self._pose.gate.refused
 
     @property
-    def waiting_for(self) -> list[str]:
-        """Return the names of the inputs without any sample so far."""
-        self._settle(self.arrays)
-        m = self.memory[0]
-        seen = {
-            "imu": not math.isnan(m.imu_stamp),
-            "mocap": m.started,
-            "joints": not math.isnan(m.joint_stamp),
-        }
-        return [name for name, received in seen.items() if not received]
-
-    @property
     def complete(self) -> bool:
         """See `complete`."""
         return complete(self.arrays)
@@ -160,11 +148,6 @@ class StateEstimator(Estimator):
     def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
         """See `take_imu`."""
         self._imu(self.arrays, stamp, gyro, specific_force)
-
-    def imu_update(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> np.ndarray:
-        """Process an IMU sample as `imu` does, and return the state as `update` does."""
-        self.imu(stamp, gyro, specific_force)
-        return self.update()
 
     def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
         """See `take_joints`."""

@@ -104,10 +104,20 @@ class ControlTick:
         vehicle: VehicleDescription | None = None,
         odometry: bool = False,
     ) -> Self:
-        """Return the tick of a flight that starts by itself.
+        """Return the tick of a flight that starts by itself; odometry: see `ControlTick`."""
+        return cls(*cls.parts(scenario, sets, timing, vehicle), bridge, odometry)
+
+    @staticmethod
+    def parts(
+        scenario: Scenario,
+        sets: Mapping[str, ParameterSet],
+        timing: Timing,
+        vehicle: VehicleDescription | None = None,
+    ) -> tuple[EstimatorStage, MissionStage, list[LawStage], HandStage]:
+        """Return estimator, mission, laws and hand of a flight that starts by itself.
 
         sets: parameters by the names of the nodes, see `Profile.sets`; vehicle: whose limits the
-        begin of the reference is compared with, if given; odometry: see `ControlTick`.
+        begin of the reference is compared with, if given.
         """
         estimator, joints = sets["state_estimator"], len(scenario.arm_start)
         start = StartParameters(auto_start=True)
@@ -117,13 +127,11 @@ class ControlTick:
             AttitudeController(sets["attitude_controller"]),
             ArmController(sets["arm_controller"]),
         )
-        return cls(
+        return (
             estimator_stage.estimator_stage(estimator, joints, timing.control_period),
             MissionStage(mission, timing),
             [LawStage(controller, timing) for controller in controllers],
             HandStage(sets["arm_controller"], timing.control_period, joints, vehicle),
-            bridge,
-            odometry,
         )
 
     def tick(

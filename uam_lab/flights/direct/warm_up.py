@@ -27,7 +27,9 @@ from uam_control.mission.scenarios.scenario import standing
 from uam_control.profiles.profile import default_profile
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.bridge_stage import sending
+from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.law_stages import arm_step, attitude_step, position_step
+from uam_control.stages.timing import Timing
 from uam_control.vehicle import chain_of
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
@@ -39,10 +41,11 @@ from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
-# options of this module as a program; further words are names of laws
+FURTHER = [law for law in LAWS if law != catalogue.DEFAULT]
 # laws whose loop is compiled beforehand: the paper's baselines; the others at their first flight
 OTHERS = [law for law, one in LAWS.items() if one.profile and law != catalogue.DEFAULT]
-STAND_IN, ALL_LAWS = "--stand-in", "--all-laws"
+# options of this module as a program; further words are names of laws
+BESIDE, ALL_LAWS = "--beside", "--all-laws"
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
@@ -69,15 +72,19 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
     """Compile the control path unless it is compiled; say: called before that takes its time."""
     if is_cold():
         say("compiling the control path (once)")
-        # the nodes of the vehicle here, beside them what stands in for it, on another core
-        command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up", STAND_IN]
+        # A flight is made from the plant on. A process on another core does this, with the further
+        # laws. Here the default law's control is made before its plant, so both rarely compile the
+        # same function.
+        command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up", BESIDE]
         with subprocess.Popen(command, stderr=subprocess.DEVNULL) as beside:
             try:
+                _control()
                 warm_up([catalogue.DEFAULT])
             except BaseException:
                 beside.terminate()
                 raise
-        warm_up(law for law in LAWS if law != catalogue.DEFAULT)
+        if beside.returncode:
+            warm_up(FURTHER)
 
 
 def prepare_direct(
@@ -89,11 +96,16 @@ def prepare_direct(
         made = (make(LAWS[law].step) for make in (position_step, attitude_step, arm_step))
         direct = (one for one in compiled_functions() if one.py_func.__module__ == DIRECT)
         if active() and not all(map(_filled, (*made, *direct, sending(STEPS)))):
-            say(f"compiling the direct engine with {law} (once)")
-            hover, vehicle = load_scenario("hover"), Vehicle.load()
-            flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
-            while flight.plant.tick < TICKS:
-                flight.advance(TICKS, TICKS)
+            _fly_direct(law, say)
+
+
+def _fly_direct(law: str, say: Callable[[str], None]) -> None:
+    """Fly a few seconds in compiled ticks."""
+    hover, vehicle = load_scenario("hover"), Vehicle.load()
+    flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
+    flight.say = say
+    while flight.plant.tick < TICKS:
+        flight.advance(TICKS, TICKS)
 
 
 def _filled(function: Callable) -> bool:
@@ -120,14 +132,10 @@ def _flight(law: str) -> DirectFlight:
     return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
 
 
-def _stand_in() -> None:
-    """Run plant and autopilot without a controller, then what no flight calls."""
-    flight = _flight(catalogue.DEFAULT)
-    arm = np.zeros(len(flight.plant.vehicle.description.joints))
-    for _ in range(TICKS // 10):
-        motors = flight.autopilot.update(*flight.plant.sense().hil)
-        flight.plant.step(motors, arm, True)
-    _others()
+def _control() -> None:
+    """Make the control of a flight with the default law."""
+    vehicle, sets = Vehicle.load().description, default_profile(catalogue.DEFAULT).sets
+    ControlTick.parts(load_scenario("hover"), sets, Timing(), vehicle)
 
 
 def _others() -> None:
@@ -152,11 +160,14 @@ def _others() -> None:
 
 
 if __name__ == "__main__":
-    if STAND_IN in sys.argv:
-        _stand_in()
-    else:
-        prepare_direct(print, [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT])
-        others = [law for law in OTHERS if ALL_LAWS in sys.argv]
-        command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up"]
-        beside = [subprocess.Popen([*command, law]) for law in others]  # each on a core
-        sys.exit(max((one.wait() for one in beside), default=0))
+    if BESIDE in sys.argv:
+        warm_up(FURTHER)
+        sys.exit()
+    prepare(print)
+    for name in [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT]:
+        if active():
+            _fly_direct(name, print)
+    others = [law for law in OTHERS if ALL_LAWS in sys.argv]
+    command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up"]
+    beside = [subprocess.Popen([*command, law]) for law in others]  # each on a core
+    sys.exit(max((one.wait() for one in beside), default=0))
