@@ -32,23 +32,19 @@ PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # for a loade
 HOVER = MASS * 9.81
 
 
-def start(*arguments):
-    return subprocess.Popen(
-        [sys.executable, "-m", "uam_sim_bridge.autopilot.server", "--once", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+MODULE = "uam_sim_bridge.autopilot.server"
 
 
 class Flight:
     """Quadrotor, HIL server, the autopilot's process and the bridge's link, in lockstep."""
 
-    def __init__(self, signing=None, arguments=()):
+    def __init__(self, start, signing=None, arguments=()):
         self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
         self.local = free_port(socket.SOCK_DGRAM)
         self.hil = HilServer(self.tcp, 4, parameters=PATIENT)
-        self.process = start(
+        self.server = start(
+            MODULE,
+            "--once",
             "--sim-port",
             self.tcp,
             "--mavlink-port",
@@ -105,17 +101,15 @@ class Flight:
         self.run(1.0, thrust=HOVER / 41.36)
 
     def close(self):
+        """Close the links; return the exit status of the process."""
         self.hil.close()
         self.link.close()
-        try:
-            return self.process.communicate(timeout=20)
-        finally:
-            self.process.kill()
+        return self.server.process.wait(20.0)
 
 
 @pytest.fixture
-def flight():
-    f = Flight()
+def flight(start):
+    f = Flight(start)
     yield f
     f.close()
 
@@ -143,10 +137,10 @@ def test_arms_flies_and_tracks_rate_steps(flight):
     assert flight.link.warnings == ()
 
 
-def test_same_flight_twice_is_the_same_to_the_bit():
+def test_same_flight_twice_is_the_same_to_the_bit(start):
     ends = []
     for _ in range(2):
-        f = Flight()
+        f = Flight(start)
         f.airborne()
         f.run(0.4, (0.5, -0.3, 0.2), 0.53)
         f.close()
@@ -218,9 +212,9 @@ def test_garbage_and_truncated_bytes_are_survived(flight):
     stranger.close()
 
 
-def test_signed_flight_and_no_answer_to_others():
+def test_signed_flight_and_no_answer_to_others(start):
     key = "ab" * 32
-    f = Flight(Signing.from_text(key), ("--signing-key", key))
+    f = Flight(start, Signing.from_text(key), ("--signing-key", key))
     f.airborne()
     assert f.link.refused == 0
     other = f.link._codec
@@ -230,15 +224,15 @@ def test_signed_flight_and_no_answer_to_others():
     f.link._codec = other
     f.run(0.1)
     assert f.link.mode is Mode.LAND and f.hil.armed
-    out, err = f.close()
-    assert key not in out + err
+    f.close()
+    assert key not in f.server.output
 
 
 def test_ends_with_the_simulator(flight):
     flight.run(0.2)
-    out, err = flight.close()
-    assert flight.process.returncode == 0
-    assert "closed the link" in out and err == ""
+    assert flight.close() == 0
+    said = flight.server.output.splitlines()
+    assert all(line.startswith("autopilot: ") for line in said) and "closed the link" in said[-1]
 
 
 @pytest.mark.parametrize(
@@ -267,28 +261,27 @@ def test_wrong_use_is_one_line_and_status_2(arguments, message, capsys):
     assert message in capsys.readouterr().err.strip().splitlines()[-1]
 
 
-def test_a_used_udp_port_is_a_one_line_error():
+def test_a_used_udp_port_is_a_one_line_error(start):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
-        process = start("--mavlink-port", s.getsockname()[1], "--wait", "0.1")
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 2 and "UDP port" in err
-    assert "in use" in err and "Traceback" not in err
+        refused = start(MODULE, "--once", "--mavlink-port", s.getsockname()[1], "--wait", "0.1")
+        assert refused.process.wait(60.0) == 2
+    (line,) = refused.output.splitlines()
+    assert "UDP port" in line and "in use" in line
 
 
-def test_sigterm_ends_it_quietly():
-    port = free_port(socket.SOCK_STREAM)
-    process = start("--sim-port", port, "--mavlink-port", free_port(socket.SOCK_DGRAM))
-    assert "waiting for the simulator" in process.stdout.readline()
-    process.terminate()
-    _, err = process.communicate(timeout=20)
-    assert process.returncode == 0 and err == ""
+def test_sigterm_ends_it_quietly(start):
+    ports = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
+    waiting = start(MODULE, "--once", "--sim-port", ports[0], "--mavlink-port", ports[1])
+    waiting.until_logged("waiting for the simulator")
+    assert waiting.interrupt(number=signal.SIGTERM) == 0
+    assert waiting.output.count("\n") == 1
 
 
 def test_help_has_examples():
-    process = start("--help")
-    out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0 and "autopilot --instance 3" in out
+    command = [sys.executable, "-m", MODULE, "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "autopilot --instance 3" in done.stdout
 
 
 class FakeAutopilot:

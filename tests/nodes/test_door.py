@@ -101,6 +101,7 @@ def test_a_recorder_in_a_namespace_outlives_broken_messages(start, probe, tmp_pa
         for data in BROKEN:
             out.publish(data)
         statuses = [s for m in reports for s in m.status if s.name == "uav1/recorder"]
+        reports.clear()
         return any(": refused /probe (" in one.message for one in statuses)
 
     probe.until(named, "the refusal is named")
