@@ -26,6 +26,7 @@ from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import box, frames, hanging
+from uam_sim_bridge.plant.gripper import FINGERS
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
 from uam_sim_bridge.plant.vehicle import SWING
 
@@ -34,21 +35,29 @@ MODEL = VEHICLE.compile(0.0)
 JOINTS = {"alpha_1": 0.4, "alpha_2": -0.7, SWING: 0.2}
 
 
-def test_the_frames_are_where_mujoco_has_them():
-    data = mujoco.MjData(MODEL)
+@pytest.mark.parametrize(
+    ("vehicle", "ends", "moving"),
+    [("s500_arm", {"magnet"}, {SWING}), ("s500_gripper", {"gripper_hand", *FINGERS}, {*FINGERS})],
+)
+def test_the_frames_are_where_mujoco_has_them(vehicle, ends, moving):
+    """Joints at 0.4, -0.7, 0.2 rad, fingers 30 mm from the middle."""
+    model = Vehicle.load(vehicle).compile(0.0)
+    data, joints = mujoco.MjData(model), JOINTS | dict.fromkeys(FINGERS, 0.03)
     data.qpos[0:3], data.qpos[3:7] = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    for name, angle in JOINTS.items():
-        data.qpos[MODEL.joint(name).qposadr[0]] = angle
-    mujoco.mj_kinematics(MODEL, data)
+    hung = frames(model)
+    assert {frame.joint for frame in hung} == {"", "alpha_1", "alpha_2", *moving}
+    for name in {frame.joint for frame in hung} - {""}:
+        data.qpos[model.joint(name).qposadr[0]] = joints[name]
+    mujoco.mj_kinematics(model, data)
     found = {BASE_LINK: (np.zeros(3), np.eye(3))}
-    for frame in frames(MODEL):
+    for frame in hung:
         position, turned = found[frame.parent]
-        own = matrix_from_quaternion(frame.turned(JOINTS.get(frame.joint, 0.0)))
-        found[frame.name] = position + turned @ frame.position, turned @ own
+        way, turn = frame.moved(joints.get(frame.joint, 0.0))
+        found[frame.name] = position + turned @ way, turned @ matrix_from_quaternion(turn)
         body = data.body(frame.name)
         assert found[frame.name][0] == pytest.approx(body.xpos, abs=1e-12)
         assert found[frame.name][1].ravel() == pytest.approx(body.xmat, abs=1e-12)
-    assert set(found) == {BASE_LINK, "shoulder", "link_1", "link_2", "magnet"}
+    assert set(found) == {BASE_LINK, "shoulder", "link_1", "link_2", *ends}
 
 
 def test_the_face_of_a_hanging_magnet_is_level():
@@ -57,7 +66,7 @@ def test_the_face_of_a_hanging_magnet_is_level():
     turned = matrix_from_quaternion(quaternion_from_euler(np.array([0.0, pitch, 0.0])))
     for frame in frames(MODEL):
         if frame.joint:
-            turned = turned @ matrix_from_quaternion(frame.turned(angles[frame.joint]))
+            turned = turned @ matrix_from_quaternion(frame.moved(angles[frame.joint])[1])
     assert turned == pytest.approx(np.eye(3), abs=1e-12)
 
 

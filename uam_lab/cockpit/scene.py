@@ -13,6 +13,7 @@ another, so it subscribes to the topics of the control loop only after the missi
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 from uam_control.arm.chain import Chain
 from uam_control.arm.hand import hand_in_world
@@ -29,7 +30,7 @@ from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.nodes.described import described_scenario, described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
-from uam_control.vehicle import chain_of
+from uam_control.vehicle import TWO_FINGER, chain_of
 from uam_lab.cockpit.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -48,6 +49,7 @@ from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import Frame, box, end_effector, frames, hanging
+from uam_sim_bridge.plant.gripper import FINGERS
 from uam_sim_bridge.plant.urdf import urdf
 from uam_sim_bridge.plant.vehicle import SWING
 
@@ -86,6 +88,7 @@ class SceneNode(UamNode):
         hung = frames(model)
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]
+        self._has_fingers = described.gripper.kind == TWO_FINGER
         self._frame = partial(frame, self)
         face = box(model, "magnet_face") if described.has_magnet else None
         boxes = face, box(model, "payload")
@@ -96,6 +99,7 @@ class SceneNode(UamNode):
         self._states: dict[int, np.ndarray] = {}
         self._command: tuple[int, PositionCommand] | None = None
         self._payload: tuple[int, np.ndarray, np.ndarray] | None = None
+        self._opening = described.gripper.opening[1]  # [m] of fingers, measured
         self._payload_is_there = False  # only a simulator publishes its pose
         self._status: tuple[int, MissionStatus] | None = None
         self._path: ReferencePath | None = None
@@ -135,7 +139,9 @@ class SceneNode(UamNode):
                     (topics.TRUTH_PAYLOAD, self._on_payload),
                     (topics.POSITION_COMMAND, self._on_command),
                     (topics.STATE, self._on_state),
+                    (topics.GRIPPER_STATE, self._on_gripper),
                 )
+                if topic is not topics.GRIPPER_STATE or self._has_fingers
             ]
 
     def _on_state(self, data: bytes) -> None:
@@ -152,6 +158,10 @@ class SceneNode(UamNode):
 
     def _on_payload(self, data: bytes) -> None:
         self._payload = read_pose(data)
+
+    def _on_gripper(self, message: Float64) -> None:
+        if math.isfinite(message.data):
+            self._opening = message.data
 
     def settle(self) -> None:
         """Publish transforms, errors and markers of the newest state when they are due."""
@@ -201,10 +211,11 @@ class SceneNode(UamNode):
         turned = quaternion_from_euler(chi[ATTITUDE])
         angles = dict(zip(self._joint_names, chi[ARM], strict=True))
         angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])
+        angles |= dict.fromkeys(FINGERS, 0.5 * self._opening)
         own = self._frame
         found = [Transform(stamp, WORLD, own(BODY), chi[POSITION], turned)]
         found += [
-            Transform(stamp, own(f.parent), own(f.name), f.position, f.turned(angles[f.joint]))
+            Transform(stamp, own(f.parent), own(f.name), *f.moved(angles[f.joint]))
             for f in self._moving
         ]
         if desired is not None:

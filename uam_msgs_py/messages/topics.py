@@ -160,7 +160,8 @@ MAGNET_STATE = Topic("uam/magnet/state", Bool, LATCHED, "", "on or off", "1 Hz a
     about="magnet as its driver has switched it: acknowledged by the autopilot or read back "
     "from the line; not simulated")
 GRIPPER_STATE = Topic("gripper/state", Float64, RELIABLE, "", "m, or 0/1", ASKED_FOR, MISSION,
-    readers="your program", recorded=False, about="measured opening; of a magnet the command")
+    readers="scene, your program", recorded=False,
+    about="measured opening; of a magnet the command")
 SETPOINT = Topic("uam/setpoint", TwistStamped, RELIABLE, BODY, "rad/s, thrust 0..1", TICK, BRIDGE,
     to=(PLANT,), about="body rates FLU and thrust 0..1 (linear.z) as sent")
 THRUST = Topic("uam/thrust", JointState, RELIABLE, "", "1, N", "10 Hz", BRIDGE, to=(MISSION,),

@@ -1,4 +1,4 @@
-"""Frames of the vehicle's bodies (arm, magnet, payload plate), from the same MJCF as the URDF."""
+"""Frames of the vehicle's bodies (arm, magnet, fingers), from the same MJCF as the URDF."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from uam_sim_bridge.plant.vehicle import BASE
 class Frame:
     """Pose of a body in the frame of its parent; `name`: of its link in the URDF.
 
-    position (3,) [m]; quaternion (4,) [w x y z], body → parent, at joint angle 0; axis (3,): unit
-    vector of the hinge; joint: its name, "" for a fixed body.
+    position (3,) [m]; quaternion (4,) [w x y z], body → parent, with the joint at 0; axis (3,):
+    unit vector of the hinge, or of a finger's slide; joint: its name, "" for a fixed body.
     """
 
     name: str
@@ -31,11 +31,16 @@ class Frame:
     quaternion: np.ndarray
     axis: np.ndarray
     joint: str = ""
+    slides: bool = False
 
-    def turned(self, angle: float) -> np.ndarray:
-        """Return the quaternion (4,) [w x y z], body → parent, at a joint angle [rad]."""
-        turn = quaternion_from_rotation_vector(self.axis * angle)
-        return quaternion_multiply(self.quaternion, turn)
+    def moved(self, joint: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return position (3,) [m] and quaternion (4,) [w x y z], body → parent, with its joint at
+        an angle [rad], or at a way [m]."""
+        if self.slides:
+            way = matrix_from_quaternion(self.quaternion) @ self.axis
+            return self.position + joint * way, self.quaternion
+        turn = quaternion_from_rotation_vector(self.axis * joint)
+        return self.position, quaternion_multiply(self.quaternion, turn)
 
 
 @dataclass(frozen=True)
@@ -64,15 +69,18 @@ def end_effector(model: mujoco.MjModel, site: str) -> list[Frame]:
 
 def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:
     parent = model.body_parentid[body]
-    index = model.body_jntadr[body]
-    hinge = index >= 0 and model.jnt_type[index] == mujoco.mjtJoint.mjJNT_HINGE
+    index, kinds = model.body_jntadr[body], mujoco.mjtJoint
+    kind = model.jnt_type[index] if index >= 0 else kinds.mjJNT_FREE
+    slides = bool(kind == kinds.mjJNT_SLIDE)
+    moves = slides or kind == kinds.mjJNT_HINGE
     return Frame(
         name=model.body(body).name,
         parent=BASE_LINK if parent == root else model.body(parent).name,
         position=model.body_pos[body].copy(),
         quaternion=model.body_quat[body].copy(),
-        axis=model.jnt_axis[index].copy() if hinge else np.zeros(3),
-        joint=model.joint(index).name if hinge else "",
+        axis=model.jnt_axis[index].copy() if moves else np.zeros(3),
+        joint=model.joint(index).name if moves else "",
+        slides=slides,
     )
 
 
