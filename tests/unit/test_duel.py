@@ -18,8 +18,9 @@ NAN = math.nan
 PROFILES = configuration.path("profiles/fsc_geo_l1.yaml").parent
 
 
-def result(scenario="a", seed=1, delay=0.0, hand=NAN, standing=NAN, outcome="completed"):
-    return DuelResult("law", scenario, seed, delay, hand, 2 * hand, 0.5, 1.5, standing, outcome)
+def result(scenario="a", seed=1, delay=0.0, hand=NAN, standing=NAN, outcome="completed", **pick):
+    errors = hand, 2 * hand, 0.5, 1.5, standing
+    return DuelResult("law", scenario, seed, delay, *errors, outcome, **pick)
 
 
 def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure():
@@ -29,6 +30,7 @@ def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure
     duel = SimpleNamespace(
         rows=["law"],
         scenarios=["a"],
+        loads={"a": 0.0},
         published={"law": {"a": (11.0, 9.0, 1.0)}, "other": {"a": (5.0, 6.0, 7.0)}},
     )
     text = report.text(duel, flown)
@@ -36,6 +38,24 @@ def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure
     assert "| other | - (5) |" in text
     # worst joint, offset 2 mm, 20 ms survived as 40 was not, 1 of 4 flights ended early, lost
     assert "| law | 1.50 | 2.0 | 20 | 1 of 4 | 1 |" in text
+
+
+def test_a_pick_has_its_means_beside_the_published_figures_and_its_worst():
+    """Platform: twice the hand; the payload 10 and 4 mm off; the third flight drops it."""
+    flown = [
+        result(hand=0.006, largest=0.044, lift=0.03, set_down=0.044, rho=0.12, placed=0.010),
+        result(seed=2, hand=0.004, largest=0.036, lift=0.036, set_down=0.02, rho=0.1, placed=0.004),
+        result(seed=3, outcome="landed"),
+    ]
+    duel = SimpleNamespace(
+        rows=["law"],
+        loads={"a": 0.2},
+        scenarios=["a"],
+        published={"law": {"a": (28.0, 26.0, 146.0, 24.0)}},
+    )
+    text = report.text(duel, flown)
+    cells = "| law | 5.0 (28) | 10.0 (26) | 40 (146) | 7.0 (24) | 10.0 | 36 | 44 | 0.12 |"
+    assert cells in text and "| law | 1.50 | - |  | 1 of 3 | 0 |" in text
 
 
 @pytest.mark.parametrize(("ends", "said"), [("cc", "40 or more"), ("lc", "0"), ("", "")])
@@ -63,6 +83,12 @@ def test_the_shipped_duel_flies_every_row_in_every_task():
     assert len(planned) == 2 * (7 * 2 + len(duel.delays))
     assert {one.label for one in planned} == {"default", "MAC"}
     assert all(one.vehicle_changes for one in planned)
+
+
+def test_the_pick_is_flown_with_its_basket_and_without_a_hover():
+    planned = list(trials(load_duel("pillars"), 2))
+    assert {one.label for one in planned} == {"default", "default, hand"} and len(planned) == 4
+    assert all((one.scenario, one.payload_mass) == ("pillars", 0.2) for one in planned)
 
 
 @pytest.mark.parametrize(

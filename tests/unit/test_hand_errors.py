@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.vehicle import load_description
+from uam_control.arm.hand import reach, shoulder
+from uam_control.vehicle import chain_of, load_description
 from uam_lab.records.results import metrics, timeseries
 from uam_lab.records.results.timeseries import FlightTable
 from uam_lab.report.facts import flight_summary
@@ -82,6 +83,35 @@ def test_the_error_of_the_hand_in_words():
     share = "44.7 mm RMS, 50.0 mm at most, heading 0.00° RMS, in flight"  # 50 mm x sqrt(4 / 5)
     assert flight_summary.hand_story(found | {"trajectory_with_ramps": None}) == share
     assert flight_summary.hand_story({"rms": {}}) is None
+
+
+def test_the_deviation_while_the_load_changes():
+    """A minute, gripped from 20 to 40 s. The vehicle is off by z from 3 s before the grip on, 8 s
+    long, by y from 7 s after the opening on: 50 mm and 30 mm; in between by x: 90 mm."""
+    made = FlightTable.of(60, load_description())
+    for k in range(60):
+        row = made.next_row("carry")
+        row[:] = 0.0
+        at = made.columns
+        row[at["time"]], row[at["magnet.on"]] = k, 20 <= k < 40
+        row[at["truth.z"]] = 0.05 * (17 <= k < 25)
+        row[at["truth.y"]] = 0.03 * (k >= 47)
+        row[at["truth.x"]] = 0.09 * (30 <= k < 35)
+    found = metrics.compute(made.series(), INFO)
+    lift, down = (found["load_steps"][name] for name in ("lift", "set_down"))
+    assert (lift["epsilon_m"], down["epsilon_m"]) == pytest.approx((0.05, 0.03))
+    assert down["rho"] == pytest.approx(0.03 / 0.27) and found["max"]["epsilon_m"] >= 0.09
+    assert metrics.compute(flight(), INFO)["load_steps"] is None
+    story = flight_summary.payload_story(found | {"payload_lifted": True})
+    assert "at most 50 mm (rho 0.19) at the lift, 30 mm (rho 0.11) at the set-down" in story
+
+
+def test_the_reach_counts_from_the_shoulder():
+    """T650: joint 1 turns about the vertical. From joint 2: |(0.024, -0.000089, -0.128)| +
+    |(0.128927, -0.019976, -0.02175)| + 0.108 m, 0.37 m as published."""
+    chain = chain_of(load_description("t650"))
+    assert shoulder(chain) == 1 and shoulder(chain_of(load_description())) == 0
+    assert reach(chain, shoulder(chain)) == pytest.approx(0.1302 + 0.1323 + 0.108, abs=1e-4)
 
 
 def test_a_turned_vehicle_moves_its_hand_aside():

@@ -35,6 +35,7 @@ LEAN = 5  # a further one of TOOL: of the tool's y axis above the horizontal [ra
 TOOL = (*HAND, LEAN)
 STEP = 1e-6  # [rad] of numerical derivatives
 NONE = 1e-9  # relative, of a singular value that counts as zero
+UPRIGHT = 0.9  # of the z component of a joint's axis, from which on it is a yaw joint
 # relative to the slopes' squared size; absolute, for slopes of zero
 DAMPING, LEAST = 1e-9, 1e-30
 
@@ -147,7 +148,12 @@ def freedom(chain: Chain) -> int:
     return int(np.sum(values > NONE * values[0]))
 
 
-def reach(chain: Chain) -> float:
-    """Return the length [m] of the stretched arm, from the first joint to the end effector."""
-    parts = (*chain.offsets[1:], chain.hand_place, chain.swing_reach)
+def shoulder(chain: Chain) -> int:
+    """Return the number of the first joint that lifts the hand, in every pose: no yaw joint."""
+    return int(np.argmin(np.abs(chain.axes[:, 2]) > UPRIGHT))
+
+
+def reach(chain: Chain, first: int = 0) -> float:
+    """Return the length [m] of the stretched arm, from joint `first` to the end effector."""
+    parts = (*chain.offsets[first + 1 :], chain.hand_place, chain.swing_reach)
     return float(sum(np.linalg.norm(part) for part in parts))

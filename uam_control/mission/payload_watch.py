@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from uam_control.ages import AHEAD
+from uam_control.arm.hand import shoulder
 from uam_control.coordinates import ALPHA, CHI, POSITION, Z
 from uam_control.grasp import (
     Grasp,
@@ -29,7 +30,6 @@ from uam_control.mission.shift import Shift
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive
-UPRIGHT = 0.9  # of the z component of a joint's axis
 ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
 
 
@@ -94,8 +94,7 @@ class PayloadWatch:
         self._chain, joints = parameters.chain(), self._guidance.motion.shape[1] - ALPHA
         known = self._chain.has_hand and len(self._chain.masses) == joints
         self._hand = partial(hand_and_levers, self._chain) if known else None
-        # the first joint that a payload's weight loads in every pose: a yaw joint's lever is zero
-        self._loaded = int(np.argmin(np.abs(self._chain.axes[:, 2]) > UPRIGHT)) if known else 0
+        self._loaded = shoulder(self._chain) if known else 0  # a yaw joint's lever is zero
 
     def advance(self, stamp: float) -> None:
         """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""

@@ -14,6 +14,7 @@ EXAMPLES = """\
 examples:
   uam duel                              every row, three seeds: some 400 flights
   uam duel --seeds 1 --rows "default, hand"
+  uam duel pillars                      pick-and-place, 20 seeds
   uam duel mine.yaml --out mine         a file as config/duel/fsc_lab.yaml; a stopped duel continues
 
 Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     given = {"profiles": profiles, "plant": duel.plant, "scenarios": duel.scenarios, "seeds": seeds}
     out = make_folder(options.out, "duel")
     table = out / "flights.parquet"
-    of = inputs(duel.vehicle, duel.hover, given)
+    of = inputs(duel.vehicle, duel.scenarios[0], given)
     experiment = Experiment("duel", table, ROWS, of, place_of(options), measure)
     found = experiment.fly(range(len(planned)), planned.__getitem__, _about)
     text = report.text(duel, list(found.values()))

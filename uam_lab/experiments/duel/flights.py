@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,29 +23,37 @@ from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
 
 SETTLED = 0.5  # share of a hover that counts as standing: its second half
-MILLI = 1e3
+MILLI, NOTHING = 1e3, float("nan")
 
 
 @dataclass(frozen=True)
 class Duel:
-    """A duel. rows: label → profile; published: label → scenario → end effector [mm], platform
-    [mm], heading [deg]; delays [ms]: of the setpoints, growing, each tried in the hover."""
+    """A duel. rows: label → profile; loads: scenario → mass [kg] of the payload that it picks;
+    published: label → scenario → figures in the order of `report.MEASURES`, of a pick `PICKED`;
+    hover: "" for none; delays [ms]: of the setpoints, growing, each tried in the hover."""
 
     vehicle: VehicleDescription
     plant: tuple[str, ...]
-    scenarios: tuple[str, ...]
+    loads: dict[str, float]
     hover: str
     seeds: int
     delays: tuple[float, ...]
     rows: dict[str, Profile]
-    published: dict[str, dict[str, tuple[float, float, float]]]
+    published: dict[str, dict[str, tuple[float, ...]]]
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """The tasks."""
+        return tuple(self.loads)
 
 
 @dataclass(frozen=True)
 class DuelResult:
-    """One flight: RMS errors with ramps, NaN for a hover or an early end: end effector, platform
-    [m], heading [deg], worst joint [deg]; standing [m]: mean offset of the end effector in hover;
-    outcome: one of `outcome.OUTCOMES`."""
+    """One flight: RMS errors with ramps, of a pick those of the flight, NaN for a hover or an early
+    end: end effector, platform [m], heading [deg], worst joint [deg]; standing [m]: mean offset of
+    the end effector in hover; outcome: one of `outcome.OUTCOMES`. Of a pick: largest, lift,
+    set_down [m]: largest deviation of the platform, in the flight and while the load changes; rho:
+    of the largest; placed [m]: of the payload from its goal."""
 
     row: str
     scenario: str
@@ -56,6 +65,11 @@ class DuelResult:
     joint: float
     standing: float
     outcome: str
+    largest: float = NOTHING
+    lift: float = NOTHING
+    set_down: float = NOTHING
+    rho: float = NOTHING
+    placed: float = NOTHING
 
     @property
     def done(self) -> bool:
@@ -83,22 +97,23 @@ def load_duel(name_or_file: str, labels: Sequence[str] = ()) -> Duel:
     for label in labels:
         if label not in given.values:
             raise given.error(label, f"no such row; there are: {', '.join(given.values)}")
-    scenarios = top.texts("scenarios")
+    loads = {name: load_scenario(name, vehicle).payload_mass for name in top.texts("scenarios")}
     of = top.section("published")
     for label in of.values:
         cells = of.section(label)
-        cells.only(scenarios)
-        published[label] = {name: cells.numbers(name, 3) for name in cells.values}
-    for scenario in (*scenarios, top.text("hover")):
-        load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
-    delays = top.entry("delays_ms")
+        cells.only(loads)
+        counts = {name: 4 if loads[name] else 3 for name in cells.values}
+        published[label] = {name: cells.numbers(name, count) for name, count in counts.items()}
+    hover = top.text("hover", default="")
+    if hover:
+        load_scenario(hover, vehicle)  # an invalid one is refused before any flight
     return Duel(
         vehicle,
         top.texts("plant"),
-        scenarios,
-        top.text("hover"),
+        loads,
+        hover,
         top.whole("seeds"),
-        tuple(map(float, delays)),
+        tuple(map(float, top.entry("delays_ms"))) if hover else (),
         {label: _profile(given.section(label), vehicle) for label in labels or given.values},
         published,
     )
@@ -115,7 +130,7 @@ def _profile(entry: Section, vehicle: VehicleDescription) -> Profile:
 def trials(duel: Duel, seeds: int) -> Iterator[Trial]:
     """Yield every scenario and the hover with its seeds, then the hover with its delays."""
     for label, made in duel.rows.items():
-        for scenario in (*duel.scenarios, duel.hover):
+        for scenario in filter(None, (*duel.scenarios, duel.hover)):
             yield from (_trial(duel, label, made, scenario, n) for n in range(1, seeds + 1))
         yield from (_trial(duel, label, made, duel.hover, 1, delay) for delay in duel.delays)
 
@@ -126,7 +141,7 @@ def _trial(
     found = [timed(parse_spec(text), {}, "delay") for text in late(1e-3 * delay, 0.0, 0.0, 0.0)]
     effects = presets.added({}, presets.read(duel.plant))
     return Trial(
-        *(label, made, 0.0, seed, scenario, effects),
+        *(label, made, duel.loads.get(scenario, 0.0), seed, scenario, effects),
         faults=Schedule(tuple(found), seed),
         drawn={"delay": delay},
     )
@@ -136,17 +151,25 @@ def measure(trial: Trial) -> DuelResult:
     """Fly; return the result. Raises TrialFailed as `trial.recorded`."""
     outcome = recorded(trial)
     figures = figures_of(trial, outcome, outcome.abort_reason)
-    ended, nothing = classify(outcome.series, figures), float("nan")
-    whole = figures["trajectory_with_ramps"] if ended == COMPLETED else None
-    rms = whole["rms"] if whole else {}
+    ended, picks = classify(outcome.series, figures), bool(trial.payload_mass)
+    whole = figures if picks else figures["trajectory_with_ramps"]
+    rms = whole["rms"] if whole and ended == COMPLETED else {}
     return DuelResult(
         *(trial.label, Path(trial.scenario).stem, trial.seed, trial.drawn["delay"]),
-        *(rms.get(name, nothing) for name in ("end_effector_norm_m", "epsilon_m")),
-        rms.get("end_effector_heading_deg", nothing),
-        max(rms["arm_deg"]) if rms else nothing,
-        nothing if whole or ended != COMPLETED else standing(outcome.series),
+        *(rms.get(name, NOTHING) for name in ("end_effector_norm_m", "epsilon_m")),
+        rms.get("end_effector_heading_deg", NOTHING),
+        max(rms["arm_deg"]) if rms else NOTHING,
+        NOTHING if rms or ended != COMPLETED else standing(outcome.series),
         ended,
+        *(_picked(figures) if picks and rms else ()),
     )
+
+
+def _picked(figures: dict[str, Any]) -> tuple[float, ...]:
+    """Return the figures of a completed pick, see `DuelResult`."""
+    most, steps = figures["max"], figures["load_steps"]
+    while_loading = (steps[name]["epsilon_m"] for name in ("lift", "set_down"))
+    return most["epsilon_m"], *while_loading, most["rho"], figures["payload_place_error_m"]
 
 
 def standing(series: Series) -> float:

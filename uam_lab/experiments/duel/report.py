@@ -1,4 +1,4 @@
-"""Tables of a duel in Markdown: published / flown, per row and task."""
+"""Tables of a duel in Markdown: flown (published), per row and task."""
 
 from __future__ import annotations
 
@@ -15,11 +15,27 @@ MEASURES: tuple[tuple[str, Callable[[DuelResult], float], int], ...] = (
     ("platform, RMSE [mm]", lambda r: MILLI * r.platform, 1),
     ("heading, RMSE [deg]", lambda r: r.heading, 2),
 )
+# of a pick, in the order of its published figures
+PICKED: tuple[tuple[str, Callable[[DuelResult], float], int], ...] = (
+    *MEASURES[:2],
+    ("platform, largest [mm]", lambda r: MILLI * r.largest, 0),
+    ("basket off its place [mm]", lambda r: MILLI * r.placed, 1),
+)
+# what is not published: its largest value of all flights
+LOADING: tuple[tuple[str, Callable[[DuelResult], float], int], ...] = (
+    ("off its place, worst [mm]", lambda r: MILLI * r.placed, 1),
+    ("platform at the lift, worst [mm]", lambda r: MILLI * r.lift, 0),
+    ("at the set-down, worst [mm]", lambda r: MILLI * r.set_down, 0),
+    ("rho, worst", lambda r: r.rho, 2),
+)
 
 
 def text(duel: Duel, results: Results) -> str:
     """Return all tables."""
-    tables = [_errors(duel, results, k) for k in range(len(MEASURES))]
+    picks = [name for name, load in duel.loads.items() if load]
+    tasks = [name for name in duel.scenarios if name not in picks]
+    tables = [_errors(duel, results, tasks, k) for k in range(len(MEASURES)) if tasks]
+    tables += [_picks(duel, results, name) for name in picks]
     return "\n\n".join([*tables, _robust(duel, results)]) + "\n"
 
 
@@ -29,19 +45,40 @@ def mean(values: Iterable[float]) -> float:
     return float(np.mean(finite)) if finite else float("nan")
 
 
-def _errors(duel: Duel, results: Results, measure: int) -> str:
-    """Return rows × scenarios of a measure: mean of the completed flights (published figure)."""
-    head, value, digits = MEASURES[measure]
+def _errors(duel: Duel, results: Results, tasks: Sequence[str], measure: int) -> str:
+    """Return rows × tasks of a measure."""
+    rows = [
+        [label, *(_cell(duel, results, label, task, MEASURES, measure) for task in tasks)]
+        for label in dict.fromkeys((*duel.published, *duel.rows))
+    ]
+    return markdown_table([MEASURES[measure][0], *tasks], rows)
+
+
+def _picks(duel: Duel, results: Results, task: str) -> str:
+    """Return rows × measures of a pick."""
     rows = []
     for label in dict.fromkeys((*duel.published, *duel.rows)):
-        cells = []
-        for scenario in duel.scenarios:
-            flown = mean(value(r) for r in _of(results, label, scenario))
-            said = duel.published.get(label, {}).get(scenario)
-            told = "" if said is None else f" ({said[measure]:g})"
-            cells.append(("-" if np.isnan(flown) else f"{flown:.{digits}f}") + told)
-        rows.append([label, *cells])
-    return markdown_table([head, *duel.scenarios], rows)
+        own = [r for r in _of(results, label, task) if r.done]
+        cells = [_cell(duel, results, label, task, PICKED, k) for k in range(len(PICKED))]
+        worst = [
+            _shown(max(map(value, own), default=np.nan), digits) for _, value, digits in LOADING
+        ]
+        rows.append([label, *cells, *worst])
+    return markdown_table([task, *(head for head, *_ in (*PICKED, *LOADING))], rows)
+
+
+def _cell(
+    duel: Duel, results: Results, label: str, task: str, measures: Sequence[tuple], number: int
+) -> str:
+    """Return the mean of the completed flights, and the published figure in brackets."""
+    _, value, digits = measures[number]
+    said = duel.published.get(label, {}).get(task)
+    told = "" if said is None else f" ({said[number]:g})"
+    return _shown(mean(map(value, _of(results, label, task))), digits) + told
+
+
+def _shown(value: float, digits: int) -> str:
+    return "-" if np.isnan(value) else f"{value:.{digits}f}"
 
 
 def _robust(duel: Duel, results: Results) -> str:
@@ -52,7 +89,7 @@ def _robust(duel: Duel, results: Results) -> str:
         joint = mean(r.joint for r in own)
         offset = MILLI * mean(r.standing for r in own)
         early, lost = sum(not r.done for r in own), sum(r.lost for r in own)
-        numbers = [f"{joint:.2f}", f"{offset:.1f}", survived(results, label)]
+        numbers = [_shown(joint, 2), _shown(offset, 1), survived(results, label)]
         rows.append([label, *numbers, f"{early} of {len(own)}", str(lost)])
     head = ["row", "worst joint, RMSE [deg]", "standing offset [mm]", "survived delay [ms]"]
     return markdown_table([*head, "ended early", "lost"], rows)

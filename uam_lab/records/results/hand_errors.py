@@ -1,7 +1,8 @@
 """Errors of the end effector, and the deviation of the vehicle, of some ticks of a flight.
 
-epsilon is the distance of the vehicle from its reference, rho = epsilon / L with the arm's reach L:
-Suarez, Vega, Ollero 2020, "Benchmarks for aerial manipulation" (RA-L).
+epsilon is the distance of the vehicle from its reference, rho = epsilon / L with the arm's reach L,
+from the shoulder to the end effector: Suarez, Vega, Ollero 2020, "Benchmarks for aerial
+manipulation" (RA-L).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from uam_control.coordinates import POSITION
 from uam_lab.records.results.hand_columns import ERROR
 from uam_lab.records.results.timeseries import Series
 
+BEFORE, AFTER = 4.0, 8.0  # [s] around a switch of the gripper, while the load changes
+
 Figure = Callable[[np.ndarray], Any]  # of errors (m,) or (m, n), over the ticks
 
 
@@ -26,6 +29,19 @@ def rms(series: Series, rows: np.ndarray) -> dict[str, Any]:
 def largest(series: Series, rows: np.ndarray) -> dict[str, Any]:
     """Return the largest magnitudes at the ticks `rows`, a mask; {} without an end effector."""
     return _figures(series, rows, lambda errors: np.max(np.abs(errors), axis=0))
+
+
+def load_steps(series: Series) -> dict[str, Any] | None:
+    """Return the `largest` errors around the last lift of a payload, and around its set-down; None
+    without a grip."""
+    spans = series.magnet_spans()
+    if not spans:
+        return None
+    switched = zip(("lift", "set_down"), spans[-1], strict=True)
+    around = {
+        name: (series.time - at >= -BEFORE) & (series.time - at <= AFTER) for name, at in switched
+    }
+    return {name: largest(series, series.flown & rows) for name, rows in around.items()}
 
 
 def _figures(series: Series, rows: np.ndarray, figure: Figure) -> dict[str, Any]:

@@ -105,6 +105,7 @@ def compute(
         "payload_lifted_at_s": payload.lifted_at_s,
         "payload_lift_height_m": payload.lift_height_m,
         "payload_place_error_m": payload.place_error_m,
+        "load_steps": hand_errors.load_steps(series),
         "landing_error_m": landing,
         "rms": errors(series, rms) | hand_errors.rms(series, series.flown),
         "max": errors(series, largest) | hand_errors.largest(series, series.flown),

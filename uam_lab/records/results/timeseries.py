@@ -23,7 +23,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from uam_control.arm.hand import reach
+from uam_control.arm.hand import reach, shoulder
 from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
@@ -195,7 +195,7 @@ class FlightTable:
             swing = values[:, columns["magnet.swing"]]
             hand = hand_columns.computed(self._flyer, chi, rows, swing)
             values[:, columns.block(hand_columns.TRUTH)] = hand
-            told["arm_reach_m"] = reach(self._flyer.chain)
+            told["arm_reach_m"] = reach(self._flyer.chain, shoulder(self._flyer.chain))
         return Series(values, self.phases[: self.count], names, told, columns)
 
 

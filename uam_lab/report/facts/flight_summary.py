@@ -123,9 +123,19 @@ def payload_story(metrics: Mapping[str, Any]) -> str:
     if not metrics["payload_lifted"]:
         return "not lifted"
     error = metrics.get("payload_place_error_m")
-    if error is None:
-        return "lifted"
-    return f"lifted, came to rest {distance(error)} from the drop point"
+    rest = "" if error is None else f", came to rest {distance(error)} from the drop point"
+    return f"lifted{rest}{_load_steps(metrics)}"
+
+
+def _load_steps(metrics: Mapping[str, Any]) -> str:
+    """Return how far the vehicle was from its reference while the load changed, in a clause."""
+    texts = [
+        f"{_number(one['epsilon_m'], 1e3, 0)} mm (rho {_number(one['rho'], 1.0, 2)})"
+        f" at the {name.replace('_', '-')}"
+        for name, one in (metrics.get("load_steps") or {}).items()
+        if one
+    ]
+    return f"; the vehicle off its path by at most {', '.join(texts)}" if texts else ""
 
 
 def landing_story(metrics: Mapping[str, Any]) -> str:
