@@ -6,8 +6,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from random_chains import in_pinocchio, pin, random_chain, unit
 
-from uam_control.arm.chain import Chain, ChainParameters, as_parameters, carrying
+from uam_control.arm.chain import ChainParameters, as_parameters, carrying
 from uam_control.arm.dynamics import gravity_torque, inverse_dynamics, mass_matrix
 from uam_control.arm.kinematics import (
     DOWN,
@@ -19,60 +20,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleError, chain_of, load_description
 from uam_control.vehicle.chain_reader import read_chain
 
-pin = pytest.importorskip("pinocchio")  # of the extra "test"
 STEP = 1e-6
-NO_HAND = {
-    "has_hand": 0, "hand_place": np.zeros(3), "hand_turn": np.eye(3), "swing_axis": np.zeros(3),
-    "swing_reach": np.zeros(3), "swing_mass": 0.0, "swing_centre": np.zeros(3),
-}  # fmt: skip
-
-
-def inertia(random):
-    """Of a body with three random principal masses."""
-    points = random.normal(size=(3, 3)) * 0.05
-    return sum(p @ p * np.eye(3) - np.outer(p, p) for p in points)
-
-
-def random_chain(random):
-    n = int(random.integers(1, 8))
-    axes = random.normal(size=(n, 3))
-    turn = pin.Quaternion(*_unit(random.normal(size=4))).matrix()
-    hand = {"has_hand": 1, "hand_place": random.normal(size=3) * 0.1, "hand_turn": turn}
-    return Chain(
-        random.normal(size=(n, 3)) * 0.2,
-        axes / np.linalg.norm(axes, axis=1)[:, None],
-        random.uniform(0.02, 0.4, n),
-        random.normal(size=(n, 3)) * 0.1,
-        np.array([inertia(random) for _ in range(n)]),
-        *random.uniform(0.0, 0.02, (3, n)),
-        2.0,
-        random.normal(size=3) * 0.03,
-        inertia(random),
-        **(NO_HAND | hand),
-    )
-
-
-def _unit(vector):
-    return vector / np.linalg.norm(vector)
-
-
-def in_pinocchio(chain):
-    """The chain on a free-flying base."""
-    model = pin.Model()
-    parent = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
-    own = pin.Inertia(chain.base_mass, chain.base_centre, chain.base_inertia)
-    model.appendBodyToJoint(parent, own, pin.SE3.Identity())
-    for i, axis in enumerate(chain.axes):
-        kind = pin.JointModelRevoluteUnaligned(*axis)
-        at = pin.SE3(np.eye(3), chain.offsets[i])
-        parent = model.addJoint(parent, kind, at, f"joint_{i}")
-        body = pin.Inertia(chain.masses[i], chain.centres[i], chain.inertias[i])
-        model.appendBodyToJoint(parent, body, pin.SE3.Identity())
-    hand = pin.Frame(
-        "hand", parent, 0, pin.SE3(chain.hand_turn, chain.hand_place), pin.FrameType.OP_FRAME
-    )
-    model.addFrame(hand)
-    return model
 
 
 def test_two_hundred_random_chains_against_pinocchio():
@@ -157,7 +105,7 @@ def test_a_tilted_offset_mount_against_mujoco(tilted):
     assert chain.masses[1] == 0.0  # of joint b: joint c turns the whole body
     random, data = np.random.default_rng(2), mujoco.MjData(model)
     for _ in range(20):
-        data.qpos[:3], data.qpos[3:7] = random.normal(size=3), _unit(random.normal(size=4))
+        data.qpos[:3], data.qpos[3:7] = random.normal(size=3), unit(random.normal(size=4))
         data.qpos[7:] = random.normal(size=3)
         data.qvel[:], data.qacc[:] = random.normal(size=(2, 9))
         mujoco.mj_forward(model, data)
@@ -238,7 +186,7 @@ def test_the_magnet_hangs():
 def test_the_jacobian_of_what_hangs_is_the_derivative_of_its_pose(roll):
     """By central differences; a tilted hinge, too."""
     chain = chain_of(load_description("s500_arm3"))
-    axis = _unit(np.array([0.3, -1.0, 0.2]))
+    axis = unit(np.array([0.3, -1.0, 0.2]))
     chain = chain._replace(swing_axis=axis, axes=np.array([axis, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
     q, below = np.array([0.3, -0.5, 0.4]), (0.1, math.sin(roll), -math.cos(roll))
     jacobian = np.zeros((6, 3))

@@ -82,6 +82,23 @@ def _put(into: np.ndarray, values: Vector) -> None:
 
 
 @jit
+def vehicle_dynamics(
+    chain: Chain,
+    motion: np.ndarray,
+    force: Vector,
+    rates: Vector,
+    turning: Vector,
+    torques: np.ndarray,
+) -> tuple[Vector, Vector]:
+    """Do what `inverse_dynamics` does, with the base: return what acts on the whole vehicle."""
+    push, moment = inverse_dynamics(chain, motion, force, rates, turning, torques)
+    centre, inertia = vector(chain.base_centre), rows(chain.base_inertia)
+    own = times(chain.base_mass, plus(force, _carried(rates, turning, centre)))
+    twist = plus(turned(inertia, turning), cross(rates, turned(inertia, rates)))
+    return plus(push, own), plus(moment, plus(twist, cross(centre, own)))
+
+
+@jit
 def gravity_torque(
     chain: Chain, angles: np.ndarray, force: Vector, torques: np.ndarray
 ) -> tuple[Vector, Vector]:

@@ -67,6 +67,13 @@ class ArmLoad(NamedTuple):
 
 
 @jit
+def friction(load: ArmLoad, j: int, speed: float, torque: float) -> float:
+    """Return the friction [N m] of joint j at a speed [rad/s], while it carries a torque [N m]."""
+    dry = load.chain.friction[j] + load.share[j] * abs(torque)
+    return load.chain.damping[j] * speed + dry * math.tanh(speed / FRICTION_SPEED)
+
+
+@jit
 def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float, float, float]:
     """Write the torques of the reference; return the moment on the base (3,) [N m, FLU].
 
@@ -83,10 +90,7 @@ def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float
     motion = reference[:, ALPHA:]
     push, moment = inverse_dynamics(chain, motion, force, rates, change, load.torques)
     for j in range(count):
-        speed = reference[CHI_DOT, ALPHA + j]
-        dry = chain.friction[j] + load.share[j] * abs(load.torques[j])
-        friction = dry * math.tanh(speed / FRICTION_SPEED)
-        load.torques[j] += chain.damping[j] * speed + friction
+        load.torques[j] += friction(load, j, reference[CHI_DOT, ALPHA + j], load.torques[j])
     moment = plus(moment, cross(vector(chain.base_centre), times(chain.base_mass, force)))
     # nothing pushes aside what the arm's motion pushes: the whole vehicle gives way
     aside = minus(push, times(chain.masses.sum(), force))

@@ -187,6 +187,13 @@ def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -
         arm_load(a.load, reference, True)
         take_known_load(a.load.torques, a.inertia, errors[FEEDFORWARD, ALPHA:], tau)
     m.saturated = limit_torque(tau, a.torque_max, a.all.tau)
+    command_goals(a, state, reference, dt)
+
+
+@jit
+def command_goals(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
+    """Write goals of the servos for the limited torques, if they take goals and these are due."""
+    m = a.all.numbers[0]
     if not a.goals:
         return
     m.time += dt

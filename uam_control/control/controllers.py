@@ -119,6 +119,14 @@ class Controller:
             self._errors = np.zeros(state.shape)
             self._make_arrays()
 
+    def enter(self, state: np.ndarray, reference: np.ndarray) -> bool:
+        """Note a tick in flight; state, reference: (3, 6 + n), see `coordinates`.
+
+        Returns whether the law begins with it in flight, see `_handed_back`.
+        """
+        self._fit(state)
+        return self._handed_back(reference)
+
     def _run_law(self, dt: float) -> None:
         self.law.update(*self._own, self._norms, self.saturated, dt)
 
@@ -195,9 +203,8 @@ class PositionController(Controller):
         if not flying:
             self._attitude.reset(state[CHI, YAW])
             return self._idle()
-        if self._handed_back(reference):
+        if self.enter(state, reference):
             self._attitude.begin(state, reference)
-        self._fit(state)
         self._begin(state, reference, self._attitude.value, True)
         self._run_law(dt)
         self._end(reference, dt)
@@ -257,9 +264,8 @@ class AttitudeController(Controller):
         if not flying:
             self._slow[:] = 0.0
             return self._idle()
-        if self._handed_back(reference):
+        if self.enter(state, reference):
             self._slow[:] = math.nan
-        self._fit(state)
         self._begin(state, reference, attitude_reference, dt)
         self._run_law(dt)
         self._end()

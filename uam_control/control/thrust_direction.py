@@ -27,6 +27,7 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import body_rates, thrust_attitude
+from uam_control.maths.vectors import Vector, cross, dot, minus, plus, times
 
 ANGLE, RATE = range(2)  # columns of the filter
 LEAD_TIME = 0.5  # [s] in which the lead decays by a factor e
@@ -152,3 +153,43 @@ def attitude_reference_step(
         - cr * roll_rate * pitch_rate
         - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
     )
+
+
+@jit
+def write_thrust_attitude(
+    force: Vector, change: Vector, bend: Vector, heading: np.ndarray, value: np.ndarray
+) -> None:
+    """Write q_d, Omega_d, Omega_d_dot of a thrust along force to value (3, 3), exactly.
+
+    force, change, bend [N, ENU]: the force and its first two derivatives; heading (3,): direction
+    [rad] of the body's x axis, as far as the thrust leaves it, and derivatives. Source: Lee 2010.
+    """
+    c, s = math.cos(heading[0]), math.sin(heading[0])
+    rate, growth = heading[1], heading[2]
+    ahead = (c, s, 0.0)
+    ahead_1 = (-rate * s, rate * c, 0.0)
+    ahead_2 = (-growth * s - rate * rate * c, growth * c - rate * rate * s, 0.0)
+    z, z_1, z_2 = _unit(force, change, bend)
+    side_1 = plus(cross(z_1, ahead), cross(z, ahead_1))
+    side_2 = plus(plus(cross(z_2, ahead), cross(z, ahead_2)), times(2.0, cross(z_1, ahead_1)))
+    y, y_1, y_2 = _unit(cross(z, ahead), side_1, side_2)
+    x, x_1 = cross(y, z), plus(cross(y_1, z), cross(y, z_1))
+    x_2 = plus(plus(cross(y_2, z), cross(y, z_2)), times(2.0, cross(y_1, z_1)))
+    value[CHI, X] = math.atan2(y[2], z[2])
+    value[CHI, Y] = math.asin(min(1.0, max(-1.0, -x[2])))
+    value[CHI, Z] = math.atan2(x[1], x[0])
+    value[CHI_DOT, X], value[CHI_DDOT, X] = dot(y_1, z), dot(y_2, z) + dot(y_1, z_1)
+    value[CHI_DOT, Y], value[CHI_DDOT, Y] = dot(z_1, x), dot(z_2, x) + dot(z_1, x_1)
+    value[CHI_DOT, Z], value[CHI_DDOT, Z] = dot(x_1, y), dot(x_2, y) + dot(x_1, y_1)
+
+
+@jit
+def _unit(v: Vector, v_1: Vector, v_2: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return v / |v| and its first two derivatives, of those of v."""
+    size = math.sqrt(dot(v, v))
+    size_1 = dot(v, v_1) / size
+    size_2 = (dot(v_1, v_1) + dot(v, v_2) - size_1 * size_1) / size
+    one = times(1.0 / size, v)
+    one_1 = times(1.0 / size, minus(v_1, times(size_1, one)))
+    rest = plus(times(size_2, one), times(2.0 * size_1, one_1))
+    return one, one_1, times(1.0 / size, minus(v_2, rest))

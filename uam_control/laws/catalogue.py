@@ -8,6 +8,7 @@ from uam_control.laws.geometric import GeometricL1Law, GeometricLaw
 from uam_control.laws.indi import IndiLaw
 from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.modular import ModularLaw
+from uam_control.laws.whole_body import WholeBodyL1Law
 from uam_control.settings.parameter_set import ParameterError
 
 LAWS: dict[str, type[Law]] = {
@@ -19,6 +20,7 @@ LAWS: dict[str, type[Law]] = {
         GeometricLaw,
         GeometricL1Law,
         IndiLaw,
+        WholeBodyL1Law,
     )
 }
 DEFAULT = ModularLaw.kind.law

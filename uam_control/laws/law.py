@@ -59,6 +59,7 @@ class Law:
     | `profile` | its profile in config/profiles; "": see `default_profile` |
     | `memory` | number of values in `adaptation` after the published gains |
     | `step` | the compiled function of one tick: step(record, inputs, adaptation, tau) |
+    | `whole` | whether in flight `control.whole_body` computes all three subsystems at once |
 
     `names`: of the published gains, which are the first values of `adaptation`, a float64 array
     (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`). `arrays`:
@@ -69,6 +70,7 @@ class Law:
     label: str
     profile: str = ""
     memory: int = 0
+    whole: bool = False
     step: Callable
 
     def __init__(self, parameters: LawParameters) -> None:

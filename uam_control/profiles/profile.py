@@ -315,4 +315,16 @@ def profile_of(
             raise ProfileError(text) from None
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
+    _check_whole(file, {node: sets[node].law for node in CONTROLLERS})
     return Profile(file.stem, file, vehicle, sets, sections)
+
+
+def _check_whole(file: Path, laws: Mapping[str, str]) -> None:
+    """Refuse a law of the whole body that only some controllers have; laws: controller → law."""
+    for node, law in laws.items():
+        other = next((one for one in laws if laws[one] != law), None)
+        if catalogue.law(law).whole and other:
+            raise ProfileError(
+                f"{file}: {node}: law: {law} is one law of all three controllers, but {other} has "
+                f"{laws[other]}"
+            )

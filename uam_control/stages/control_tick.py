@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.control.whole_body import whole_body_step as compute_whole_body
 from uam_control.coordinates import ALPHA, ARM, POSITION
 from uam_control.estimation.estimator import write_biases
 from uam_control.estimation.pose_anchor import PoseAnchor, anchor
@@ -30,9 +31,11 @@ from uam_control.stages.hand_stage import HandStage, hand_step
 from uam_control.stages.law_stages import (
     LawStage,
     MeasuredDelay,
+    WholeBodyStage,
     arm_step,
     attitude_step,
     position_step,
+    whole_body_step,
 )
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.signals import (
@@ -59,7 +62,8 @@ from uam_control.vehicle import VehicleDescription
 class ControlTick:
     """All stages in one process, and the `signals` between them.
 
-    `stages`: STAGES; further ones may be inserted before the first tick.
+    `stages`: STAGES, or with a law of the whole body WHOLE_BODY in place of MODULAR; further ones
+    may be inserted before the first tick.
     """
 
     def __init__(
@@ -73,11 +77,13 @@ class ControlTick:
     ) -> None:
         """laws: of position, attitude and arm; hand: before that of the arm; odometry: whether the
         poses are those of one, whose jumps are taken out in the tick, see `PoseAnchor`."""
-        self.stages = list(STAGES)
         self.anchor, self.odometry = PoseAnchor(), odometry
         self.estimator, self.mission = estimator, mission
         self.hand, self.bridge = hand, bridge
         self.position, self.attitude, self.arm = laws
+        whole = self.arm.controller.law.whole
+        self.whole = WholeBodyStage(laws) if whole else None
+        self.stages = [*SENSING, *((WHOLE_BODY,) if whole else MODULAR), *SENDING]
         self.measured_delay = MeasuredDelay(self.attitude.controller)
         self.laws: dict[str, LawStage] = {
             "position": self.position,
@@ -260,6 +266,19 @@ def control_arm(tick: ControlTick) -> bool:
     return True
 
 
+def control_whole_body(tick: ControlTick) -> bool:
+    """state, reference → what the stages MODULAR write, by one law in flight."""
+    s, position = tick.signals, tick.position.controller
+    if not s.flying:
+        return all(stage.run(tick) for stage in MODULAR)
+    tick.whole.update(s.stamp, s.state, s.reference)
+    s.attitude_reference[:] = position.attitude_reference
+    for number, stage in enumerate(tick.laws.values()):
+        if stage.gains_due:
+            tick.mission.inputs.put(GAINS + number, s.stamp, stage.controller.adaptation)
+    return True
+
+
 def send_setpoint(tick: ControlTick) -> bool:
     """state, laws → setpoint to the autopilot; the autopilot's report to the mission."""
     s, bridge = tick.signals, tick.bridge
@@ -392,6 +411,11 @@ def _law_step(make: Callable[[Callable], Callable], law: str) -> Callable:
     return step
 
 
+def _whole_body_step(tick: ControlTick) -> Step:
+    arrays = tick.arrays, tick.whole.arrays, tick.mission.inputs.arrays
+    return Step(whole_body_step(compute_whole_body), arrays)
+
+
 def _bridge_step(tick: ControlTick) -> Step | None:
     bridge, port = tick.bridge, tick.bridge.autopilot
     if not bridge.compiled or port.steps is None:
@@ -427,14 +451,20 @@ def _ahead(tick: ControlTick) -> tuple:
     return tick.mission.inputs.arrays, tick.mission.arrays
 
 
-STAGES: Sequence[Stage] = (
+SENSING = (
     Stage("listeners of the sensors", listen, _listen_step),
     Stage("estimator", estimate, _estimate_step, decides=False),
     Stage("mission", fly_mission, _step(mission_step, _flown)),
+)
+MODULAR = (
     Stage("position law", control_position, _law_step(position_step, "position"), decides=False),
     Stage("attitude law", control_attitude, _law_step(attitude_step, "attitude"), decides=False),
     Stage("hand", steer_hand, _step(hand_step, _steered), decides=False),
     Stage("arm law", control_arm, _law_step(arm_step, "arm"), decides=False),
+)
+WHOLE_BODY = Stage("whole body", control_whole_body, _whole_body_step, decides=False)
+SENDING = (
     Stage("bridge", send_setpoint, _bridge_step),
     Stage("next reference", look_ahead, _step(look_ahead_step, _ahead)),
 )
+STAGES: Sequence[Stage] = (*SENSING, *MODULAR, *SENDING)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -18,6 +18,7 @@ from uam_control.control.around_law import (
     predict_by,
 )
 from uam_control.control.controllers import AttitudeController, Controller
+from uam_control.control.whole_body import WholeBody, WholeBodyArrays
 from uam_control.laws.law import LawInputs
 from uam_control.maths.compiled import borrowing, inlined, prepared
 from uam_control.maths.memory import Flag, put, record
@@ -100,7 +101,11 @@ class LawStage:
 
         inputs: those of the controller's `update`, without dt: see `step_to`.
         """
-        return self.controller.update(*inputs, self._step(self.memory, stamp))
+        return self.controller.update(*inputs, self.begin(stamp))
+
+    def begin(self, stamp: int) -> float:
+        """Begin the tick `stamp` [ns]; see `step_to`."""
+        return self._step(self.memory, stamp)
 
 
 @borrowing
@@ -174,6 +179,48 @@ def arm_step(law: Callable) -> Callable[[tuple], int]:
         law(r.all.law.record, given(r.all, dt), r.all.law.adaptation, r.all.law.tau)
         end_arm(r, s.state, reference, dt)
         keep_gains(stage, inputs, ARM, s.numbers[0].stamp, r.all.law.adaptation)
+        return DONE
+
+    return control
+
+
+class WholeBodyStage:
+    """The stages of position, attitude and arm in flight, of one law: `stages`, in this order."""
+
+    def __init__(self, stages: Sequence[LawStage]) -> None:
+        self.stages = tuple(stages)
+        self._law = WholeBody(*(one.controller for one in stages))
+
+    @property
+    def arrays(self) -> tuple[WholeBodyArrays, tuple[np.ndarray, ...]]:
+        """What the compiled step uses: of the law, and memories of the stages."""
+        return self._law.arrays, tuple(one.memory for one in self.stages)
+
+    def update(self, stamp: int, state: np.ndarray, reference: np.ndarray) -> None:
+        """Compute the outputs of all controllers at the tick `stamp` [ns]; see `WholeBody`."""
+        steps = [one.begin(stamp) for one in self.stages]
+        self._law.update(state, reference, steps[POSITION])
+
+
+@cache
+def whole_body_step(law: Callable) -> Callable[[tuple], int]:
+    """Return the compiled step of `control_tick.control_whole_body` with a law of all three."""
+
+    @borrowing
+    def control(a: tuple) -> int:
+        s, (w, stages), inputs = a
+        laws, stamp = (w.position.all, w.attitude.all, w.arm.all), s.numbers[0].stamp
+        if not (laws[0].numbers[0].flying and laws[1].numbers[0].flying):
+            return DECIDE
+        dt = step_to(stages[POSITION], stamp)
+        step_to(stages[ATTITUDE], stamp)
+        step_to(stages[ARM], stamp)
+        law(w, s.state, s.reference, dt)
+        for row in range(3):
+            put(w.position.attitude[row], s.attitude_reference[row])
+        for number in range(3):
+            adaptation = laws[number].law.adaptation
+            keep_gains(stages[number], inputs, number, stamp, adaptation)
         return DONE
 
     return control
