@@ -31,7 +31,7 @@ test: setup      ## all but the long and the slow tests; options: make test ARGS
 	@$(BIN)/python -m uam_lab.flights.direct.warm_up --all-laws
 	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "$(MARKS)" $(AT_ONCE) tests)
 
-long: setup      ## further flights, examples among them; ten minutes more
+long: setup      ## further flights, moments and seeds, examples among them; ten minutes more
 	@$(BIN)/python -m pytest -m long $(AT_ONCE) tests
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; half an hour
