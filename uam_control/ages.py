@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 
 # [s], in order of their size
 AHEAD = 0.05  # a pose may be so far ahead of the IMU, or behind the last one: more is a wrong clock
@@ -28,13 +28,13 @@ REJECTED = 10.0  # poses off the estimate: for so long; a failsafe is on the gro
 OTHER_CLOCK = 10.0  # stamps: of a clock that the autopilot does not know, not of an old pose
 
 
-@jit
+@borrowing
 def usable(age: float, oldest: float) -> bool:
     """Return whether a pose of this age [s] is one for a consumer of poses up to `oldest` [s]."""
     return -AHEAD <= age <= oldest
 
 
-@jit
+@borrowing
 def age_by(stamp: float, time: float) -> float:
     """Return the age [s] that the autopilot gives a pose of `stamp` [s] at `time` [s].
 

@@ -10,6 +10,7 @@ from planar_arm import planar_arm
 
 from uam_control.control.arm_load import ArmLoadParameters, arm_load
 from uam_control.control.controllers import ArmController, AttitudeController
+from uam_control.coordinates import ALPHA, CHI
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import load_profile
 from uam_control.settings.parameter_set import ParameterError
@@ -25,7 +26,7 @@ def load(reference, vehicle="s500_arm", **changes):
 
 def loaded(reference, values, turning=False):
     one = ArmLoadParameters.from_mapping(values).load()
-    moment = arm_load(one, reference, turning)
+    moment = arm_load(one, reference, reference[CHI, ALPHA:], turning)
     return one.torques, np.array(moment)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import LEVEL, ORIGIN, next_link
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.vectors import (
     Vector,
     cross,
@@ -18,10 +18,12 @@ from uam_control.maths.vectors import (
     transposed,
     turned,
     vector,
+    write,
 )
 
 ANGLE, RATE, ACCELERATION = range(3)  # rows of a motion
 PLACE, AXIS, FORCE, MOMENT = range(4)  # of a joint and its link
+LINK = 4  # their number
 
 
 @jit
@@ -40,8 +42,22 @@ def inverse_dynamics(
     turning [rad/s^2], their derivative. Force and moment are those that the base exerts on the arm,
     the moment about the base's origin. Without friction and damping of the joints.
     """
+    found = np.empty((motion.shape[1], LINK, 3))
+    return newton_euler(chain, motion, force, rates, turning, torques, found)
+
+
+@borrowing
+def newton_euler(
+    chain: Chain,
+    motion: np.ndarray,
+    force: Vector,
+    rates: Vector,
+    turning: Vector,
+    torques: np.ndarray,
+    found: np.ndarray,
+) -> tuple[Vector, Vector]:
+    """Do what `inverse_dynamics` does, with the memory found (n, LINK, 3) of the links."""
     count = motion.shape[1]
-    found = np.empty((count, 4, 3))
     place, turn = ORIGIN, LEVEL
     for i in range(count):
         joint, after = next_link(chain, i, motion[ANGLE, i], place, turn)
@@ -56,10 +72,10 @@ def inverse_dynamics(
         back, inertia = transposed(turn), rows(chain.inertias[i])
         own = turned(back, rates)
         twist = plus(turned(inertia, turned(back, turning)), cross(own, turned(inertia, own)))
-        _put(found[i, PLACE], place)
-        _put(found[i, AXIS], axis)
-        _put(found[i, FORCE], push)
-        _put(found[i, MOMENT], plus(turned(turn, twist), cross(plus(place, centre), push)))
+        write(place, found[i, PLACE])
+        write(axis, found[i, AXIS])
+        write(push, found[i, FORCE])
+        write(plus(turned(turn, twist), cross(plus(place, centre), push)), found[i, MOMENT])
     total, moment = ORIGIN, ORIGIN
     for i in range(count - 1, -1, -1):
         total = plus(total, vector(found[i, FORCE]))
@@ -70,15 +86,10 @@ def inverse_dynamics(
     return total, moment
 
 
-@jit
+@borrowing
 def _carried(rates: Vector, turning: Vector, point: Vector) -> Vector:
     """Return the acceleration [m/s^2] of a point [m] of a body that turns, beyond its origin's."""
     return plus(cross(turning, point), cross(rates, cross(rates, point)))
-
-
-@jit
-def _put(into: np.ndarray, values: Vector) -> None:
-    into[0], into[1], into[2] = values
 
 
 @jit

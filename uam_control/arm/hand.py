@@ -15,7 +15,7 @@ import numpy as np
 from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import hand_jacobian, hand_pose, last_link
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.rotations import matrix_from_euler, wrap_angle
 from uam_control.maths.vectors import (
     Rows,
@@ -50,32 +50,32 @@ def hand_in_world(chain: Chain, chi: np.ndarray) -> tuple[Vector, Rows]:
     return _placed(chain, chi, rotation, times(-1.0, rotation[2]))
 
 
-@jit
+@borrowing
 def _placed(chain: Chain, chi: np.ndarray, rotation: Rows, down: Vector) -> tuple[Vector, Rows]:
     """Return what `hand_in_world` does, for a hand that hangs along `down`, in the base frame."""
     place, turn = hand_pose(chain, chi[ARM], down)
     return plus(vector(chi[POSITION]), turned(rotation, place)), product(rotation, turn)
 
 
-@jit
+@borrowing
 def heading(turn: Rows) -> float:
     """Return the heading [rad] of a tool with this rotation to the world."""
     return math.atan2(-turn[0][1], turn[1][1])
 
 
-@jit
+@borrowing
 def elevation(turn: Rows) -> float:
     """Return the elevation [rad] of a tool with this rotation to the world."""
     return math.atan2(turn[2][0], turn[2][2])
 
 
-@jit
+@borrowing
 def lean(turn: Rows) -> float:
     """Return how far [rad] the y axis of a tool with this rotation to the world is raised."""
     return math.asin(min(1.0, max(-1.0, turn[2][1])))
 
 
-@jit
+@borrowing
 def _swung(chain: Chain, angles: np.ndarray, swing: float) -> Vector:
     """Return where down is in the base, for a hand whose hinge stands at `swing` [rad]."""
     turn = product(last_link(chain, angles)[1], about(vector(chain.swing_axis), swing))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.maths.vectors import (
     Rows,
     Vector,
@@ -30,14 +30,14 @@ ORIGIN = (0.0, 0.0, 0.0)
 UPRIGHT = 1e-9  # a hinge along its load or along the vertical does not swing
 
 
-@jit
+@borrowing
 def next_link(chain: Chain, i: int, angle: float, place: Vector, turn: Rows) -> tuple[Vector, Rows]:
     """Return joint [m] and rotation of link i at an angle [rad], from those of the link before."""
     place = plus(place, turned(turn, vector(chain.offsets[i])))
     return place, product(turn, about(vector(chain.axes[i]), angle))
 
 
-@jit
+@borrowing
 def last_link(chain: Chain, angles: np.ndarray) -> tuple[Vector, Rows]:
     """Return the last joint [m] and the rotation of its link; angles (n,) [rad]."""
     place, turn = ORIGIN, LEVEL
@@ -46,7 +46,7 @@ def last_link(chain: Chain, angles: np.ndarray) -> tuple[Vector, Rows]:
     return place, turn
 
 
-@jit
+@borrowing
 def hanging(chain: Chain, turn: Rows, down: Vector) -> Rows:
     """Return the rotation of what carries the end effector.
 
@@ -62,7 +62,7 @@ def hanging(chain: Chain, turn: Rows, down: Vector) -> Rows:
     return product(turn, about(axis, math.atan2(dot(axis, cross(load, below)), dot(load, below))))
 
 
-@jit
+@borrowing
 def hand_pose(chain: Chain, angles: np.ndarray, down: Vector) -> tuple[Vector, Rows]:
     """Return position [m] and rotation (end effector → base) of the end effector.
 
@@ -75,7 +75,7 @@ def hand_pose(chain: Chain, angles: np.ndarray, down: Vector) -> tuple[Vector, R
     return place, product(turn, rows(chain.hand_turn))
 
 
-@jit
+@borrowing
 def hand_jacobian(chain: Chain, angles: np.ndarray, down: Vector, jacobian: np.ndarray) -> None:
     """Write velocity [m/s] and angular velocity [rad/s] of the hand per joint rate, (6, n).
 
@@ -95,7 +95,7 @@ def hand_jacobian(chain: Chain, angles: np.ndarray, down: Vector, jacobian: np.n
             jacobian[k, i], jacobian[3 + k, i] = linear[k], spin[k]
 
 
-@jit
+@borrowing
 def _swing_rate(chain: Chain, turn: Rows, down: Vector, spin: Vector) -> Vector:
     """Return the angular velocity with which a hinge keeps its load down in a link that turns.
 
@@ -111,7 +111,7 @@ def _swing_rate(chain: Chain, turn: Rows, down: Vector, spin: Vector) -> Vector:
     return times(-leaves / holds, axis)
 
 
-@jit
+@borrowing
 def arm_moment(chain: Chain, angles: np.ndarray, down: Vector) -> tuple[float, Vector]:
     """Return mass [kg] and first moment [kg m] of the links about the base's origin."""
     mass, moment = 0.0, ORIGIN
@@ -125,7 +125,7 @@ def arm_moment(chain: Chain, angles: np.ndarray, down: Vector) -> tuple[float, V
     return mass, plus(moment, times(chain.swing_mass, hangs))
 
 
-@jit
+@borrowing
 def vehicle_centre(chain: Chain, angles: np.ndarray, down: Vector) -> Vector:
     """Return the centre of mass [m] of base and links."""
     mass, moment = arm_moment(chain, angles, down)

@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain, ChainParameters
-from uam_control.arm.dynamics import inverse_dynamics
+from uam_control.arm.dynamics import LINK, newton_euler
 from uam_control.arm.kinematics import DOWN, ORIGIN, vehicle_centre
-from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X, Z
-from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import matrix_from_euler, rotate_back
-from uam_control.maths.vectors import cross, minus, plus, times, vector
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, X, Y, Z
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import put
+from uam_control.maths.rotations import rows_from_euler
+from uam_control.maths.vectors import Vector, cross, minus, plus, times, transposed, turned, vector
 from uam_control.settings import parameter_set
 from uam_control.settings.parameter_set import ANY_LENGTH, ParameterError, number, switch
 from uam_control.vehicle import GRAVITY
@@ -52,46 +53,54 @@ class ArmLoadParameters(ChainParameters):
         """Return what `arm_load` uses."""
         chain, torques = self.chain(), np.zeros(len(self.link_masses))
         share = np.array(self.joint_load_friction or torques, dtype=float)
-        return ArmLoad(chain, share, float(self.arm_gravity), bool(self.arm_feedforward), torques)
+        motion, links = np.zeros((3, len(torques))), np.zeros((len(torques), LINK, 3))
+        gravity, on = float(self.arm_gravity), bool(self.arm_feedforward)
+        return ArmLoad(chain, share, gravity, on, torques, motion, links)
 
 
 class ArmLoad(NamedTuple):
     """share (n,): friction per torque; gravity [m/s^2]; on: whether the load is fed forward;
-    torques (n,) [N m]: of the joints."""
+    torques (n,) [N m]: of the joints; motion, links: memory of `newton_euler`."""
 
     chain: Chain
     share: np.ndarray
     gravity: float
     on: bool
     torques: np.ndarray
+    motion: np.ndarray
+    links: np.ndarray
 
 
-@jit
+@borrowing
 def friction(load: ArmLoad, j: int, speed: float, torque: float) -> float:
     """Return the friction [N m] of joint j at a speed [rad/s], while it carries a torque [N m]."""
     dry = load.chain.friction[j] + load.share[j] * abs(torque)
     return load.chain.damping[j] * speed + dry * math.tanh(speed / FRICTION_SPEED)
 
 
-@jit
-def arm_load(load: ArmLoad, reference: np.ndarray, turning: bool) -> tuple[float, float, float]:
+@borrowing
+def arm_load(load: ArmLoad, reference: np.ndarray, angles: np.ndarray, turning: bool) -> Vector:
     """Write the torques of the reference; return the moment on the base (3,) [N m, FLU].
 
-    reference: (3, 6 + n), see `coordinates`; turning: also for its angular acceleration. The moment
-    is what the rotors must add because of the arm, and of a base whose centre of mass is beside
-    its origin; about the origin, where thrust acts. Thrust has the direction of the specific force.
+    reference: (3, 6 + n), see `coordinates`; angles (n,) [rad] of the joints, in place of its own;
+    turning: also for its angular acceleration. The moment is what the rotors must add because of
+    the arm, and of a base whose centre of mass is beside its origin; about the origin, where thrust
+    acts. Thrust has the direction of the specific force.
     """
     chain, count = load.chain, len(load.torques)
-    acceleration = reference[CHI_DDOT, X:ROLL].copy()
-    acceleration[Z] += load.gravity
-    force = vector(rotate_back(matrix_from_euler(reference[CHI, ROLL:ALPHA]), acceleration))
+    chi, acceleration = reference[CHI], reference[CHI_DDOT]
+    upward = acceleration[Z] + load.gravity
+    to_base = transposed(rows_from_euler(chi[ROLL], chi[PITCH], chi[YAW]))
+    force = turned(to_base, (acceleration[X], acceleration[Y], upward))
     rates = vector(reference[CHI_DOT, ROLL:ALPHA])
-    change = vector(reference[CHI_DDOT, ROLL:ALPHA]) if turning else ORIGIN
-    motion = reference[:, ALPHA:]
-    push, moment = inverse_dynamics(chain, motion, force, rates, change, load.torques)
+    change = vector(acceleration[ROLL:ALPHA]) if turning else ORIGIN
+    put(angles, load.motion[CHI])
+    for row in range(CHI_DOT, CHI_DDOT + 1):
+        put(reference[row, ALPHA:], load.motion[row])
+    push, moment = newton_euler(chain, load.motion, force, rates, change, load.torques, load.links)
     for j in range(count):
         load.torques[j] += friction(load, j, reference[CHI_DOT, ALPHA + j], load.torques[j])
     moment = plus(moment, cross(vector(chain.base_centre), times(chain.base_mass, force)))
     # nothing pushes aside what the arm's motion pushes: the whole vehicle gives way
     aside = minus(push, times(chain.masses.sum(), force))
-    return minus(moment, cross(vehicle_centre(chain, reference[CHI, ALPHA:], DOWN), aside))
+    return minus(moment, cross(vehicle_centre(chain, angles, DOWN), aside))

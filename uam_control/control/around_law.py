@@ -26,7 +26,7 @@ from uam_control.control.thrust_direction import attitude_reference_step
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 
 # saturated: whether a limit changed the output of the last tick; flying: whether the law has begun;
 # printed: form of the errors' rates; frozen: see `Law`; time [s]: counted for the goals of servos
@@ -102,7 +102,7 @@ class ArmArrays(NamedTuple):
     hold: np.ndarray
 
 
-@jit
+@borrowing
 def begin_law(
     a: ControllerArrays,
     state: np.ndarray,
@@ -115,7 +115,7 @@ def begin_law(
     tracking_errors(state, reference, attitude_reference, flying, printed, a.errors, a.norms)
 
 
-@jit
+@borrowing
 def begin_attitude(
     a: AttitudeArrays,
     state: np.ndarray,
@@ -132,17 +132,14 @@ def begin_attitude(
             a.all.errors[FEEDFORWARD, i] = planned * reference[CHI_DDOT, i]
     if a.load.on:
         # the law's own inertia, that of vehicle and arm, has the angular acceleration already
-        motion = reference
-        if a.measured:
-            motion = reference.copy()
-            motion[CHI, ALPHA:] = state[CHI, ALPHA:]
-        moment = arm_load(a.load, motion, False)
+        angles = state[CHI, ALPHA:] if a.measured else reference[CHI, ALPHA:]
+        moment = arm_load(a.load, reference, angles, False)
         for i in range(3):
             a.turn[i] = moment[i] / a.inertia[i]
     lead_attitude(a.all.errors, a.prediction[0].ahead, a.turn, a.washout, dt, a.slow)
 
 
-@jit
+@borrowing
 def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
     """Use the measured `loop_delay` [s], from a setpoint to the gyro's response; NaN: unknown.
 
@@ -154,7 +151,7 @@ def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
         p.ahead = min(LONGEST_PREDICTION, p.prediction + max(0.0, loop_delay - p.nominal))
 
 
-@jit
+@borrowing
 def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     """Complete the law's force and limit it; then write the desired attitude.
 
@@ -171,26 +168,26 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
         turn_level(reference[CHI_DOT, YAW] * dt, a.carried[0])
 
 
-@jit
+@borrowing
 def end_attitude(a: AttitudeArrays) -> None:
     """Limit the law's torques: see `limit_torque`."""
     a.all.numbers[0].saturated = limit_torque(a.all.law.tau, a.torque_max, a.all.tau)
 
 
-@jit
+@borrowing
 def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Complete the law's torques and limit them; then write goals of the servos if they are due."""
     m, errors, tau = a.all.numbers[0], a.all.errors, a.all.law.tau
     saturated = m.saturated != 0
     complete_effort(errors[E, ALPHA:], a.inertia, a.gain, a.limit, saturated, dt, a.integral, tau)
     if a.load.on:
-        arm_load(a.load, reference, True)
+        arm_load(a.load, reference, reference[CHI, ALPHA:], True)
         take_known_load(a.load.torques, a.inertia, errors[FEEDFORWARD, ALPHA:], tau)
     m.saturated = limit_torque(tau, a.torque_max, a.all.tau)
     command_goals(a, state, reference, dt)
 
 
-@jit
+@borrowing
 def command_goals(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Write goals of the servos for the limited torques, if they take goals and these are due."""
     m = a.all.numbers[0]

@@ -18,7 +18,7 @@ from uam_control.arm.chain import Chain
 from uam_control.arm.hand import hand_in_world
 from uam_control.arm.kinematics import hand_jacobian
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, ROLL, X
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.maths.vectors import (
     Vector,
@@ -130,7 +130,7 @@ def steer(
         h.reference[CHI_DOT, ALPHA + i] += h.correction[1, i]
 
 
-@jit
+@borrowing
 def _why(h: HandArrays, flying: bool, away: float, square: np.ndarray) -> int:
     """Return which of FADES counts, for a hand that is `away` [m] from its place; square: see
     `squared`."""
@@ -153,7 +153,7 @@ def squared(jacobian: np.ndarray) -> np.ndarray:
     return square
 
 
-@jit
+@borrowing
 def hardest(square: np.ndarray, freedom: int) -> float:
     """Return how far the hand moves in its hardest direction [m/rad], at least.
 

@@ -12,7 +12,7 @@ from uam_control.control.arm_load import ArmLoadParameters
 from uam_control.control.hand_steering import HandParameters
 from uam_control.coordinates import ALPHA, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import (
     TINY,
     ParameterError,
@@ -159,7 +159,7 @@ class AttitudeLimits(TorqueLimits, ArmLoadParameters):
     )
 
 
-@jit
+@borrowing
 def limit_force(
     tau: np.ndarray,
     weight: float,
@@ -189,7 +189,7 @@ def limit_force(
     return limited[2] != upward or scale != 1.0
 
 
-@jit
+@borrowing
 def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -> bool:
     """Write tau within ±torque_max to limited (n,); return whether a limit acted.
 
@@ -202,7 +202,7 @@ def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -
     return cut
 
 
-@jit
+@borrowing
 def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.ndarray) -> None:
     """Take the slow part out of feedforward (n,), in place: a first-order high-pass.
 
@@ -216,7 +216,7 @@ def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.nd
         feedforward[i] -= slow[i]
 
 
-@jit
+@borrowing
 def lead_attitude(
     errors: np.ndarray,
     ahead: float,
@@ -242,7 +242,7 @@ def lead_attitude(
     wash_out(errors[FEEDFORWARD, ROLL:ALPHA], corner, dt, slow)
 
 
-@jit
+@borrowing
 def turn_level(angle: float, bias: np.ndarray) -> None:
     """Turn bias (3,) by angle [rad] about the vertical, in place."""
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -250,7 +250,7 @@ def turn_level(angle: float, bias: np.ndarray) -> None:
     bias[0], bias[1] = cosine * x - sine * y, sine * x + cosine * y
 
 
-@jit
+@borrowing
 def integrate(
     e: np.ndarray, gain: np.ndarray, limit: float, saturated: bool, dt: float, integral: np.ndarray
 ) -> None:
@@ -283,7 +283,7 @@ class ForceCompletion(NamedTuple):
     tilt_max: float
 
 
-@jit
+@borrowing
 def complete_force(
     c: ForceCompletion,
     velocity_d: np.ndarray,
@@ -308,7 +308,7 @@ def complete_force(
         tau[i] = own * heavier - c.inertia[i] * (integral[i] + bias[i])
 
 
-@jit
+@borrowing
 def complete_and_limit(
     reference: np.ndarray,
     e: np.ndarray,
@@ -329,7 +329,7 @@ def complete_and_limit(
     return limit_force(tau, c.weight, c.thrust_min, c.thrust_max, c.tilt_max, limited)
 
 
-@jit
+@borrowing
 def complete_effort(
     e: np.ndarray,
     inertia: np.ndarray,
@@ -349,7 +349,7 @@ def complete_effort(
         tau[i] -= inertia[i] * integral[i]
 
 
-@jit
+@borrowing
 def take_known_load(
     load: np.ndarray, inertia: np.ndarray, acceleration_d: np.ndarray, tau: np.ndarray
 ) -> None:

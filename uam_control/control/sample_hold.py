@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 
 
@@ -24,7 +24,7 @@ class SampleHold:
         return self._is_new(self.memory, time)
 
 
-@jit
+@borrowing
 def is_new(hold: np.ndarray, time: float) -> bool:
     """Whether a command is new at the tick of `time` [s]; call it once per tick.
 

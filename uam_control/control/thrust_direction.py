@@ -25,7 +25,7 @@ from uam_control.coordinates import (
     Y,
     Z,
 )
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.rotations import body_rates, thrust_attitude
 from uam_control.maths.vectors import Vector, cross, dot, minus, plus, times
 
@@ -85,7 +85,7 @@ class AttitudeReference:
         return self.value
 
 
-@jit
+@borrowing
 def attitude_reference_step(
     tau_p: np.ndarray,
     reference: np.ndarray,
@@ -108,7 +108,6 @@ def attitude_reference_step(
     correction_pitch = desired_pitch - reference[CHI, PITCH]
 
     omega = 2.0 * math.pi * cutoff
-    accelerations = np.empty(2)
     for axis in (X, Y):
         desired = correction_roll if axis == X else correction_pitch
         angle, rate = filtered[axis, ANGLE], filtered[axis, RATE]
@@ -122,12 +121,12 @@ def attitude_reference_step(
         slope = rate + omega * offset
         filtered[axis, ANGLE] = desired + decay * (offset + slope * dt)
         filtered[axis, RATE] = decay * (rate - omega * slope * dt)
-        accelerations[axis] = -omega * omega * (filtered[axis, ANGLE] - desired) - (
+        value[CHI_DDOT, axis] = -omega * omega * (filtered[axis, ANGLE] - desired) - (
             2.0 * omega * filtered[axis, RATE]
         )
 
-    for axis in (X, Y):
-        accelerations[axis] += reference[CHI_DDOT, ROLL + axis]
+    roll_acceleration = value[CHI_DDOT, X] + reference[CHI_DDOT, ROLL]
+    pitch_acceleration = value[CHI_DDOT, Y] + reference[CHI_DDOT, PITCH]
     roll, pitch = (
         reference[CHI, ROLL] + filtered[X, ANGLE],
         reference[CHI, PITCH] + filtered[Y, ANGLE],
@@ -140,22 +139,22 @@ def attitude_reference_step(
         roll, pitch, roll_rate, pitch_rate, yaw_rate
     )
     # their derivative
-    value[CHI_DDOT, X] = accelerations[X] - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
+    value[CHI_DDOT, X] = roll_acceleration - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
     value[CHI_DDOT, Y] = (
-        cr * accelerations[Y]
+        cr * pitch_acceleration
         + sr * cp * yaw_acceleration
         - sr * roll_rate * pitch_rate
         + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate
     )
     value[CHI_DDOT, Z] = (
-        -sr * accelerations[Y]
+        -sr * pitch_acceleration
         + cr * cp * yaw_acceleration
         - cr * roll_rate * pitch_rate
         - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
     )
 
 
-@jit
+@borrowing
 def write_thrust_attitude(
     force: Vector, change: Vector, bend: Vector, heading: np.ndarray, value: np.ndarray
 ) -> None:
@@ -183,7 +182,7 @@ def write_thrust_attitude(
     value[CHI_DOT, Z], value[CHI_DDOT, Z] = dot(x_1, y), dot(x_2, y) + dot(x_1, y_1)
 
 
-@jit
+@borrowing
 def _unit(v: Vector, v_1: Vector, v_2: Vector) -> tuple[Vector, Vector, Vector]:
     """Return v / |v| and its first two derivatives, of those of v."""
     size = math.sqrt(dot(v, v))

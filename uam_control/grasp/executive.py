@@ -41,6 +41,7 @@ CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
 LATE = 2.0  # after align_timeout: factor on the tolerances of the alignment, and on the timeout
 WEIGHED_FOR = 0.5  # [s] for which an identified mass alone must show the payload: no transient
 CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a contact is over
+PERIOD, CARRY_PERIOD = 0.02, 0.1  # [s] between two steps; away from every stand
 
 
 class GraspExecutive:
@@ -64,6 +65,7 @@ class GraspExecutive:
         self._start = np.zeros(3)  # tool at the begin of the descent
         self._gripped = np.full((2, 3), math.nan)  # tool and payload at the grip
         self._lasting, self._contact = Lasting(), Lasting()  # of a condition; of a contact
+        self.period = PERIOD  # [s] until the next step
         self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
             Step.APPROACH: self._approach,
             Step.ALIGN: self._align,
@@ -109,6 +111,7 @@ class GraspExecutive:
             return self.directive
         self._since = min(self._since, sight.stamp)
         self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))
+        self.period = PERIOD
         self._steps[self._step](sight, window)
         return self.directive
 
@@ -339,6 +342,8 @@ class GraspExecutive:
             self._go(Step.RELEASE, sight)
             return
         beside = _across(sight.tool - self._start) < BESIDE
+        if not beside and sight.time < window.release - CARRY_PERIOD:
+            self.period = CARRY_PERIOD
         if beside and self._touches(sight):
             self._leave_contact(sight)
             return

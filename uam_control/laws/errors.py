@@ -21,20 +21,16 @@ from uam_control.coordinates import (
     YAW,
     X,
 )
-from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import (
-    matrix_from_euler,
-    relative_rotation,
-    rotate,
-    rotate_back,
-)
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.rotations import rows_from_euler
+from uam_control.maths.vectors import cross, minus, product, transposed, turned, vector, write
 
 ERROR_RATE_FORMS = ("lee", "printed")
 E, E_DOT, FEEDFORWARD = range(3)  # rows of the errors
 XI, ACCELERATION, RATE = range(3)  # ||xi||, ||chi_ddot||, ||chi_dot|| in the norms
 
 
-@jit
+@borrowing
 def tracking_errors(
     state: np.ndarray,
     reference: np.ndarray,
@@ -74,7 +70,7 @@ def tracking_errors(
     norms[RATE] = math.sqrt(rate)
 
 
-@jit
+@borrowing
 def attitude_errors(
     state: np.ndarray, attitude_reference: np.ndarray, printed: bool, errors: np.ndarray
 ) -> None:
@@ -83,28 +79,25 @@ def attitude_errors(
     Eq. (14), e_q, and eq. (15), rate of e_q. Arguments as in `tracking_errors`; the results are
     in the body frame (FLU) [1, rad/s, rad/s^2].
     """
-    actual = matrix_from_euler(state[CHI, ROLL:ALPHA])
-    desired = matrix_from_euler(attitude_reference[CHI])
-    relative = relative_rotation(desired, actual)  # R_d^T R
+    q, q_d = state[CHI], attitude_reference[CHI]
+    actual = rows_from_euler(q[ROLL], q[PITCH], q[YAW])
+    back = transposed(rows_from_euler(q_d[0], q_d[1], q_d[2]))
+    relative = product(back, actual)  # R_d^T R
     # eq. (14), e_q
-    errors[E, ROLL] = 0.5 * (relative[2, 1] - relative[1, 2])
-    errors[E, PITCH] = 0.5 * (relative[0, 2] - relative[2, 0])
-    errors[E, YAW] = 0.5 * (relative[1, 0] - relative[0, 1])
-    rate = state[CHI_DOT, ROLL:ALPHA]
-    rate_d = attitude_reference[CHI_DOT]
-    acceleration_d = attitude_reference[CHI_DDOT]
+    errors[E, ROLL] = 0.5 * (relative[2][1] - relative[1][2])
+    errors[E, PITCH] = 0.5 * (relative[0][2] - relative[2][0])
+    errors[E, YAW] = 0.5 * (relative[1][0] - relative[0][1])
+    rate = vector(state[CHI_DOT, ROLL:ALPHA])
+    rate_d = vector(attitude_reference[CHI_DOT])
+    acceleration_d = vector(attitude_reference[CHI_DDOT])
     if printed:  # eq. (15), rate of e_q: q_dot - R_d^T R q_d_dot
-        turned = rotate(relative, rate_d)
-        for i in range(3):
-            errors[E_DOT, ROLL + i] = rate[i] - turned[i]
-            errors[FEEDFORWARD, ROLL + i] = acceleration_d[i]
+        write(minus(rate, turned(relative, rate_d)), errors[E_DOT, ROLL:ALPHA])
+        write(acceleration_d, errors[FEEDFORWARD, ROLL:ALPHA])
         return
     # in place of eq. (15), the `lee` form: Omega - R^T R_d Omega_d
-    turned = rotate_back(relative, rate_d)  # R^T R_d Omega_d
-    feedforward = rotate_back(relative, acceleration_d)
-    for i in range(3):
-        errors[E_DOT, ROLL + i] = rate[i] - turned[i]
+    relative = transposed(relative)
+    moving = turned(relative, rate_d)  # R^T R_d Omega_d
+    write(minus(rate, moving), errors[E_DOT, ROLL:ALPHA])
     # d/dt (R^T R_d Omega_d) = R^T R_d Omega_d_dot - Omega x (R^T R_d Omega_d)
-    errors[FEEDFORWARD, ROLL] = feedforward[0] - (rate[1] * turned[2] - rate[2] * turned[1])
-    errors[FEEDFORWARD, PITCH] = feedforward[1] - (rate[2] * turned[0] - rate[0] * turned[2])
-    errors[FEEDFORWARD, YAW] = feedforward[2] - (rate[0] * turned[1] - rate[1] * turned[0])
+    feedforward = minus(turned(relative, acceleration_d), cross(rate, moving))
+    write(feedforward, errors[FEEDFORWARD, ROLL:ALPHA])

@@ -10,29 +10,33 @@ import math
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.vectors import Rows
+
+
+@borrowing
+def rows_from_euler(roll: float, pitch: float, yaw: float) -> Rows:
+    """Return the rows of R_B^W, eq. (3), rot_matrix, of three angles [rad]."""
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, sr * cp, cp * cr),
+    )
 
 
 @jit
 def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
-    """Return R_B^W (3, 3), eq. (3), rot_matrix, of roll, pitch, yaw [rad] in `euler` (3,)."""
-    cr, sr = math.cos(euler[0]), math.sin(euler[0])
-    cp, sp = math.cos(euler[1]), math.sin(euler[1])
-    cy, sy = math.cos(euler[2]), math.sin(euler[2])
+    """Return R_B^W (3, 3), see `rows_from_euler`, of roll, pitch, yaw [rad] in `euler` (3,)."""
     matrix = np.empty((3, 3))
-    matrix[0, 0] = cy * cp
-    matrix[0, 1] = cy * sp * sr - sy * cr
-    matrix[0, 2] = cy * sp * cr + sy * sr
-    matrix[1, 0] = sy * cp
-    matrix[1, 1] = sy * sp * sr + cy * cr
-    matrix[1, 2] = sy * sp * cr - cy * sr
-    matrix[2, 0] = -sp
-    matrix[2, 1] = sr * cp
-    matrix[2, 2] = cp * cr
+    for i, row in enumerate(rows_from_euler(euler[0], euler[1], euler[2])):
+        matrix[i, 0], matrix[i, 1], matrix[i, 2] = row
     return matrix
 
 
-@jit
+@borrowing
 def thrust_attitude(force: np.ndarray, yaw: float) -> tuple[float, float]:
     """Return roll and pitch [rad] at yaw [rad] whose body z axis is along force (3,) [N, world].
 
@@ -45,7 +49,7 @@ def thrust_attitude(force: np.ndarray, yaw: float) -> tuple[float, float]:
     return roll, math.atan2(cy * x + sy * y, z)
 
 
-@jit
+@borrowing
 def body_rates(
     roll: float, pitch: float, roll_rate: float, pitch_rate: float, yaw_rate: float
 ) -> tuple[float, float, float]:
@@ -70,16 +74,6 @@ def rotate_back(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
     out = np.empty(3)
     for i in range(3):
         out[i] = matrix[0, i] * v[0] + matrix[1, i] * v[1] + matrix[2, i] * v[2]
-    return out
-
-
-@jit
-def relative_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a^T b (3, 3) of two rotation matrices (3, 3): the rotation frame b → frame a."""
-    out = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
     return out
 
 
@@ -193,7 +187,7 @@ def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
 wrapped = jit(wrap_angle)  # the same for compiled functions
 
 
-@jit
+@borrowing
 def tilt(euler: np.ndarray) -> float:
     """Return the angle [rad] between the vertical axes of body and world.
 

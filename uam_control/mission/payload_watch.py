@@ -29,7 +29,6 @@ from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.shift import Shift
 from uam_control.supervision import Readings
 
-PERIOD = 0.02  # [s] between two steps of the executive
 ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
 
 
@@ -59,17 +58,17 @@ class WithoutDescent:
 
 
 class PayloadWatch:
-    """The executive of a flight, stepped 50 times a second while the scenario is flown.
+    """The executive of a flight, stepped at its own period while the scenario is flown.
 
     `due_from` [s]: scenario time from which on it is stepped.
     """
 
-    _stepped, due_from = Number(), Number()
+    _stepped, _period, due_from = Number(), Number(), Number()
 
     def __init__(
         self, scenario: Scenario, guidance: Guidance, parameters: MissionParameters
     ) -> None:
-        self.memory = record("", "stepped due_from")
+        self.memory = record("", "stepped period due_from")
         windows = grasp_windows(scenario.motions, scenario.magnet, dict(scenario.approaches))
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
@@ -77,6 +76,7 @@ class PayloadWatch:
         self._shift = Shift()
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
+        self._period = self.executive.period
         self._due = prepared(due, self.memory, 0.0, 0.0)
         self._places = PlaceHistory()  # of the tool
         self._planned: tuple[GraspWindow, np.ndarray] | None = None  # tool at its descent
@@ -133,6 +133,7 @@ class PayloadWatch:
             return ""
         self._stepped = stamp
         directive = executive.step(self._sight(stamp, state, readings))
+        self._period = executive.period
         guidance.pace(stamp, directive.pace)
         self._shift.aim(stamp, directive.shift)
         window = directive.without_descent
@@ -209,4 +210,4 @@ def due(watch: np.ndarray, stamp: float, time: float) -> bool:
     """Return whether a `PayloadWatch` is due at `stamp` [s] and the scenario's `time` [s]; watch
     (1,): its memory."""
     m = watch[0]
-    return stamp - m.stepped >= PERIOD - 1e-6 and time >= m.due_from
+    return stamp - m.stepped >= m.period - 1e-6 and time >= m.due_from

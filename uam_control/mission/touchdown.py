@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DOT, Z
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.mission.mission_parameters import MissionParameters
 
 
@@ -45,7 +45,7 @@ class Touchdown:
         return stamp - self._at_rest_since >= p.touchdown_time
 
 
-@jit
+@borrowing
 def on_ground(state: np.ndarray, ground: float, height: float, speed: float) -> bool:
     """Return whether the vehicle is low and slow.
 

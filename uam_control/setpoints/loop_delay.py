@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, jit, prepared
 
 DELAYS = 31  # T of 0 to 30 periods, 120 ms at 250 Hz
 LOW, HIGH = 1.0, 10.0  # [Hz] corners of the band-pass; two low-passes: propellers shake the gyro
@@ -138,13 +138,13 @@ class LoopDelay:
         pause(self.sums)
 
 
-@jit
+@borrowing
 def pause(state: DelaySums) -> None:
     """Forget the last tick; the delay is unknown."""
     state.now[STAMP] = math.nan
 
 
-@jit
+@borrowing
 def follow(
     stamp: float,
     setpoint: np.ndarray,
@@ -218,7 +218,7 @@ def advance(
         total[-1] = forget * total[-1] + 1.0
 
 
-@jit
+@borrowing
 def both_axes(sums: np.ndarray, total: np.ndarray, numbers: DelayNumbers) -> tuple[float, float]:
     """Return the delay [s], NaN if unknown, and the explained share of the better axis.
 

@@ -41,7 +41,7 @@ import numpy as np
 
 from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.setpoints.thrust_curve import (
     command_of_thrust,
@@ -140,7 +140,7 @@ class RateThrustParameters(RateLimits):
         return p
 
 
-@jit
+@borrowing
 def rate_thrust_map(
     tau_p: np.ndarray,
     tau_q: np.ndarray,
@@ -189,7 +189,7 @@ def rate_thrust_map(
     return thrust
 
 
-@jit
+@borrowing
 def rate_thrust_of_state(
     tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray, p: np.ndarray, rates: np.ndarray
 ) -> float:
@@ -198,7 +198,7 @@ def rate_thrust_of_state(
     return rate_thrust_map(tau_p, tau_q, attitude, body_rates, p, rates)
 
 
-@jit
+@borrowing
 def use_factor(memory: np.ndarray, flat: np.ndarray, factor: float) -> None:
     """Use a thrust factor; memory (1,), flat (14,): of the `RateThrustMap`."""
     m = memory[0]

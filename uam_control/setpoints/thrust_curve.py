@@ -17,17 +17,17 @@ from __future__ import annotations
 
 import math
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 
 
-@jit
+@borrowing
 def curve(factor: float, u: float) -> float:
     """Return factor u^2 + (1 - factor) u, the relative thrust of command u in 0..1 (clamped)."""
     u = min(1.0, max(0.0, u))
     return factor * u * u + (1.0 - factor) * u
 
 
-@jit
+@borrowing
 def inverse_curve(factor: float, relative_thrust: float) -> float:
     """Return u in 0..1 with curve(factor, u) = relative_thrust (clamped to 0..1)."""
     y = min(1.0, max(0.0, relative_thrust))
@@ -37,7 +37,7 @@ def inverse_curve(factor: float, relative_thrust: float) -> float:
     return 2.0 * y / denominator if denominator > 0.0 else 0.0
 
 
-@jit
+@borrowing
 def command_of_thrust(
     newtons: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
 ) -> float:
@@ -50,7 +50,7 @@ def command_of_thrust(
     return curve(model_factor, u)
 
 
-@jit
+@borrowing
 def thrust_of_command(
     command: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
 ) -> float:
@@ -59,7 +59,7 @@ def thrust_of_command(
     return full_thrust * battery * curve(motor_factor, u)
 
 
-@jit
+@borrowing
 def thrust_slope(
     command: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
 ) -> float:

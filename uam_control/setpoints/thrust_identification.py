@@ -35,7 +35,7 @@ import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.laws.law_parameters import structured
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.settings.parameter_set import Bound, ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
@@ -119,7 +119,7 @@ class ThrustIdentificationParameters(ParameterSet):
         return super().validated(axes)
 
 
-@jit
+@borrowing
 def steady_force(
     state: np.ndarray, tilt_max: float, acceleration_max: float, gravity: float
 ) -> float:
@@ -143,7 +143,7 @@ def steady_force(
     return force if force > 0.0 else 0.0
 
 
-@jit
+@borrowing
 def identify(
     time: float,
     state: np.ndarray,
@@ -183,7 +183,7 @@ def identify(
     return m.factor
 
 
-@jit
+@borrowing
 def compare(
     time: float, dt: float, state: np.ndarray, command: float, p: np.record, m: np.record
 ) -> None:
@@ -205,7 +205,7 @@ def compare(
         move(gain * (measured - m.factor), dt, p, m)
 
 
-@jit
+@borrowing
 def hanging(time: float, dt: float, measured: float, p: np.record, m: np.record) -> bool:
     """Whether a payload may still hang on the magnet that is off; see `identify`."""
     if math.isnan(m.recent):
@@ -222,7 +222,7 @@ def hanging(time: float, dt: float, measured: float, p: np.record, m: np.record)
     return False
 
 
-@jit
+@borrowing
 def move(step: float, dt: float, p: np.record, m: np.record) -> None:
     """Change the factor by `step`, within slew limit and bounds; see `identify`."""
     limit = p.factor_slew * dt

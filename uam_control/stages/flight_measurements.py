@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI_DOT, ROLL
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.setpoints.loop_delay import (
     DelayNumbers,
     DelaySums,
@@ -57,7 +57,7 @@ class Sent(NamedTuple):
     factor: float
 
 
-@jit
+@borrowing
 def measure(
     now: float,
     step: float,

@@ -12,7 +12,7 @@ from uam_control.ages import FORWARDED
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT
 from uam_control.estimation.pose_clock import PoseClock, counts
 from uam_control.estimation.repeats import Repeats, repeated
-from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import put, record
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterSet, number
@@ -116,7 +116,7 @@ def pose_due(a: VisionArrays, now: float, state: np.ndarray, known: bool) -> boo
     return True
 
 
-@jit
+@borrowing
 def beyond(position: np.ndarray, state: np.ndarray, age: float) -> float:
     """Return the distance [m] of a pose's position (3,) from the estimate (3, 6 + n), less the way
     that the vehicle goes in the pose's age [s]."""

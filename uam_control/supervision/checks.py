@@ -13,7 +13,7 @@ import numpy as np
 
 from uam_control.ages import FORWARDED, usable
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
@@ -246,7 +246,7 @@ def _cause(check: Check, value: float, limit: float) -> str:
     return check.form.format(name=check.name, value=check.sign * value, limit=check.sign * limit)
 
 
-@jit
+@borrowing
 def measure_all(
     a: CheckArrays,
     state: np.ndarray,
@@ -277,7 +277,7 @@ def measure_all(
     return _below(values, bounds[:box])
 
 
-@jit
+@borrowing
 def measure(
     state: np.ndarray,
     reference: np.ndarray,
@@ -320,7 +320,7 @@ def measure(
     values[7] = math.sqrt(apart) if usable(age, FORWARDED) and not math.isnan(apart) else -math.inf
 
 
-@jit
+@borrowing
 def read(
     readings: np.ndarray,
     efforts: np.ndarray,
@@ -340,13 +340,13 @@ def read(
     values[GAIN] = _largest(gains, gain_limits)
 
 
-@jit
+@borrowing
 def _known(value: float) -> float:
     """Return the value; -inf, which passes every check, for an unknown one (NaN)."""
     return -math.inf if math.isnan(value) else value
 
 
-@jit
+@borrowing
 def _largest(values: np.ndarray, limits: np.ndarray) -> float:
     """Return the largest |value| / limit; values (n,) without a limit and NaN are ignored."""
     found = -math.inf
@@ -357,7 +357,7 @@ def _largest(values: np.ndarray, limits: np.ndarray) -> float:
     return found
 
 
-@jit
+@borrowing
 def _below(values: np.ndarray, limits: np.ndarray) -> bool:
     """Return whether every value (n,) is below its limit (n,); False for a NaN."""
     for i in range(len(limits)):

@@ -11,7 +11,7 @@ import numpy as np
 
 from uam_control.ages import STALE
 from uam_control.estimation.repeats import Repeats, repeated
-from uam_control.maths.compiled import borrowing, jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Known, Number, put, record
 from uam_control.supervision.observation import ReadingArrays, Readings
 from uam_control.supervision.pace import Pace
@@ -229,7 +229,7 @@ def take_ages(a: InputArrays, stamp: float) -> None:
     r.pose_controller_age = stamp - m.oldest_of_pose
 
 
-@jit
+@borrowing
 def follow_bias(
     stamp: float, first: float, last: float, bias: np.ndarray, mean: np.ndarray
 ) -> float:
@@ -247,7 +247,7 @@ def follow_bias(
     return math.sqrt(squared)
 
 
-@jit
+@borrowing
 def largest_of(values: np.ndarray, places: np.ndarray) -> float:
     """Return the largest |value| at `places` (m,) of values (n,); NaN for m = 0 or with a NaN."""
     found = math.nan

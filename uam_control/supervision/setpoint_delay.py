@@ -13,19 +13,19 @@ from __future__ import annotations
 
 import math
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.supervision.supervision_parameters import SupervisionLimits
 
 SYMMETRIC = 0.5  # share of the round trip that is on the way to the autopilot, if both are alike
 
 
-@jit
+@borrowing
 def by_link(round_trip: float, share: float, in_flight: bool) -> float:
     """Return the delay [s] that the round trip [s] shows, NaN if unknown; share: on the ground."""
     return (SYMMETRIC if in_flight else share) * round_trip
 
 
-@jit
+@borrowing
 def by_loop(loop_delay: float, nominal: float, in_flight: bool) -> float:
     """Return the delay [s] that the loop delay [s] shows, NaN if unknown; it counts in flight."""
     if not in_flight:
@@ -34,7 +34,7 @@ def by_loop(loop_delay: float, nominal: float, in_flight: bool) -> float:
     return 0.0 if late < 0.0 else late
 
 
-@jit
+@borrowing
 def larger(link: float, loop: float) -> float:
     """Return the larger of two delays [s]; NaN only if both are unknown."""
     return loop if math.isnan(link) or loop > link else link

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import CHI, Z
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.checks import (
@@ -383,7 +383,7 @@ class Supervisor:
         return event if (self.state, event) in TARGETS or not disarm else Event.DISARM_ON_GROUND
 
 
-@jit
+@borrowing
 def stays_behind(supervisor: np.ndarray, stamp: float, planned: float) -> bool:
     """Return whether the reference, `planned` [m] above the ground, has been airborne for
     liftoff_timeout at `stamp` [s], without the vehicle.

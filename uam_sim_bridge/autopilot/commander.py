@@ -27,7 +27,7 @@ import math
 
 import numpy as np
 
-from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_sim_bridge.autopilot.battery import ChargeState
@@ -42,7 +42,7 @@ BATTERY_WARNINGS = {
 }
 
 
-@jit
+@borrowing
 def take_setpoint(commander: np.ndarray, time: float) -> None:
     """Register a valid setpoint that arrived at `time` [s]; commander (1,): its memory."""
     m = commander[0]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_sim_bridge.autopilot.autopilot_estimator import EstimatorArrays, fuse, predict
 from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
@@ -42,7 +42,7 @@ class RateLoop(NamedTuple):
     motors: np.ndarray
 
 
-@jit
+@borrowing
 def control_tick(
     gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray, loop: RateLoop
 ) -> None:
@@ -64,7 +64,7 @@ def control_tick(
     drive_motors(setpoint[3], loop)
 
 
-@jit
+@borrowing
 def drive_motors(thrust: float, loop: RateLoop) -> None:
     """Write the motors for the torque in the loop's memory and a normalised thrust."""
     torque = loop.memory[TORQUE]
@@ -74,7 +74,7 @@ def drive_motors(thrust: float, loop: RateLoop) -> None:
         loop.motors[i] = inverse_curve(loop.model_factor, loop.motors[i])
 
 
-@jit
+@borrowing
 def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
     """Return the norm of the quaternion of an external pose; 0 if the pose is not usable.
 
@@ -102,7 +102,7 @@ class CycleArrays(NamedTuple):
     numbers: np.ndarray
 
 
-@jit
+@borrowing
 def fly_rates(a: CycleArrays, time: float, gyro: np.ndarray, accel: np.ndarray) -> bool:
     """Do what `Autopilot.update` does in flight with body rates; False, and nothing, if more is to
     be decided."""

@@ -295,14 +295,14 @@ class JoinedAutopilot(FlightState):
         return motors
 
 
-@jit
+@borrowing
 def begin_poll(port: np.ndarray, time: float) -> None:
     """Begin a tick of the bridge at `time` [s]; port (1,): memory of a `JoinedAutopilot`."""
     m = port[0]
     m.period, m.now = min(m.period, time - m.now), time
 
 
-@jit
+@borrowing
 def report(port: np.ndarray, time: float) -> None:
     """Send the regular reports that are due at `time` [s]."""
     m = port[0]
@@ -314,7 +314,7 @@ def report(port: np.ndarray, time: float) -> None:
         m.landed_due = following(m.landed_due, LANDED, time)
 
 
-@jit
+@borrowing
 def following(due: float, interval: float, time: float) -> float:
     """Return the time [s] of the report after the one due at `due`; as in `Telemetry.due`."""
     return due + interval if due + interval > time else time + interval

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.vehicle import POSITION_SERVO
 
 # Dynamixel XM430-W210, ROBOTIS e-manual: units of its control table
@@ -51,7 +51,7 @@ class Rotors:
         )
 
 
-@jit
+@borrowing
 def rotor_step(
     commands: np.ndarray,
     constants: np.ndarray,
@@ -113,7 +113,7 @@ class Servos:
         joint_step(self.command, angle, velocity, self.constants, self.loop, self.torque, output)
 
 
-@jit
+@borrowing
 def receive(sent: np.ndarray, tick: int, waiting: np.ndarray, held: np.ndarray) -> None:
     """Send a command on the bus; the one that arrives at this tick is written to `held` (n,).
 
@@ -129,7 +129,7 @@ def receive(sent: np.ndarray, tick: int, waiting: np.ndarray, held: np.ndarray) 
             held[i] = value
 
 
-@jit
+@borrowing
 def joint_step(
     command: np.ndarray,
     angle: np.ndarray,
@@ -151,7 +151,7 @@ def joint_step(
         servo_step(command, velocity, constants, torque, output)
 
 
-@jit
+@borrowing
 def position_step(
     goal: np.ndarray,
     angle: np.ndarray,
@@ -176,7 +176,7 @@ def position_step(
         output[i] = torque[i]
 
 
-@jit
+@borrowing
 def servo_step(
     effort: np.ndarray,
     velocity: np.ndarray,

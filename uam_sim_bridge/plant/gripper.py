@@ -10,7 +10,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.vehicle.model import PREFIX
 from uam_sim_bridge.plant.actuators import COUNTS_PER_TURN, P_GAIN_SCALE, PWM_FULL
 
@@ -77,7 +77,7 @@ class Fingers:
             self.ends[0, 1] = np.clip(opening, *self._numbers["opening"])
 
 
-@jit
+@borrowing
 def move_fingers(ends: np.ndarray, goal: np.ndarray, close: bool) -> None:
     """Move the goals (m,) towards the closed or the open end; ends: see `Fingers`."""
     for i in range(len(goal)):
@@ -85,7 +85,7 @@ def move_fingers(ends: np.ndarray, goal: np.ndarray, close: bool) -> None:
         goal[i] += min(max(end - goal[i], -step), step)
 
 
-@jit
+@borrowing
 def write_grip(opening: np.ndarray, force: np.ndarray, row: np.ndarray) -> None:
     """Write opening [m] and closing force [N] to row (2,); NaN without a gripper."""
     row[0] = opening[0] if len(opening) else np.nan

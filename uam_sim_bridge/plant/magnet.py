@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 
 LAW = 4  # constants of the magnet's law
 NO_MAGNET = np.ones(LAW)  # its force is 0: nothing has its control
@@ -33,7 +33,7 @@ def magnet_constants(
     return np.array([*whole, *np.ravel(curve)])
 
 
-@jit
+@borrowing
 def pull_fraction(
     face: np.ndarray, payload: np.ndarray, payload_axes: np.ndarray, constants: np.ndarray
 ) -> float:
@@ -62,7 +62,7 @@ def pull_fraction(
     return 1.0 / (ratio * ratio)
 
 
-@jit
+@borrowing
 def on_curve(gap: float, constants: np.ndarray) -> float:
     """Return the fraction at a gap [m] on the curve in the constants of `magnet_constants`."""
     last = len(constants) - 2

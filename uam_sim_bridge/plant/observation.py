@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.gripper import write_grip
 from uam_sim_bridge.plant.plant import TruthRow
@@ -45,7 +45,7 @@ class Observed(NamedTuple):
     grip_force: np.ndarray
 
 
-@jit
+@borrowing
 def observe(
     o: Observed,
     noise: np.ndarray,
@@ -70,7 +70,7 @@ def observe(
     write_truth(o, magnet_gain, at, truth)
 
 
-@jit
+@borrowing
 def write_truth(o: Observed, magnet_gain: float, at: TruthRow, row: np.ndarray) -> None:
     """Write the true values to row (at.width,); magnet_gain [N]: full holding force."""
     size = ALPHA + len(o.alpha)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_sim_bridge.plant.actuators import joint_step, receive, rotor_step
 from uam_sim_bridge.plant.gripper import move_fingers
 from uam_sim_bridge.plant.magnet import pull_fraction
@@ -54,7 +54,7 @@ class PhysicsArrays(NamedTuple):
     specific_force: np.ndarray
 
 
-@jit
+@borrowing
 def begin_period(
     a: PhysicsArrays, arm_command: np.ndarray, magnet: bool, gust: np.ndarray, tick: int
 ) -> None:
@@ -73,7 +73,7 @@ def begin_period(
     move_fingers(a.finger_ends, a.finger_goal, magnet)
 
 
-@jit
+@borrowing
 def actuate(a: PhysicsArrays, commands: np.ndarray) -> None:
     """Write thrusts and joint torques of the next physics step; commands (rotors,): 0..1."""
     rotor_step(
@@ -96,14 +96,14 @@ def actuate(a: PhysicsArrays, commands: np.ndarray) -> None:
     )
 
 
-@jit
+@borrowing
 def average(a: PhysicsArrays, weight: float) -> None:
     """Add `weight` times the specific force of a physics step to its mean."""
     for i in range(3):
         a.specific_force[i] += weight * a.sensed_force[i]
 
 
-@jit
+@borrowing
 def blow(wind: np.ndarray, mean: np.ndarray, keep: float, gust: np.ndarray) -> None:
     """Advance wind (3,) by a control period: it returns to `mean` by 1 - keep; gust (3,) is added.
 

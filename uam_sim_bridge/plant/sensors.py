@@ -263,7 +263,7 @@ class Encoders:
         self.units = np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
 
 
-@jit
+@borrowing
 def disturbed(
     rates: np.ndarray,
     specific_force: np.ndarray,
@@ -310,7 +310,7 @@ def noisy_pose(
     attitude[:] = quaternion_multiply(quaternion, turn)
 
 
-@jit
+@borrowing
 def quantised(
     angle: np.ndarray,
     velocity: np.ndarray,

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.vehicle.rotor_geometry import PITCH, ROLL, THRUST, YAW
 
 YAW_MARGIN = 0.15  # of the motor range, kept for yaw at full thrust (PX4: minimum yaw margin)
 WEAK = 0.2  # mixer entries below this do not desaturate (PX4)
 
 
-@jit
+@borrowing
 def _desaturate(
     motors: np.ndarray, mixer: np.ndarray, axis: int, upper: float, down_only: bool
 ) -> None:
@@ -46,7 +46,7 @@ def _desaturate(
             motors[i] += gain * mixer[i, axis]
 
 
-@jit
+@borrowing
 def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.ndarray) -> None:
     """Write the motor thrusts 0..1 into `motors` (n,).
 
@@ -69,7 +69,7 @@ def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.nd
         motors[i] = min(1.0, max(0.0, motors[i]))
 
 
-@jit
+@borrowing
 def unallocated_torque(
     torque: np.ndarray, motors: np.ndarray, inverse_mixer: np.ndarray, out: np.ndarray
 ) -> None:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, DOWN, GRAVITY
 from uam_sim_bridge.autopilot.params import Parameters
@@ -22,7 +22,7 @@ _DOWN_BY_NOW = 5.0  # s of such a descent, after which the thrust falls
 _FALLING = 1.0  # m/s^3, the fall of the thrust
 
 
-@jit
+@borrowing
 def descend(euler: np.ndarray, downward: float, gains: np.ndarray, setpoint: np.ndarray) -> None:
     """Write body rates [rad/s, FRD] and thrust into setpoint (4,).
 

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import borrowing
 
 # rows of `memory` (7, 3), the state of the loop
 DELAY_1, DELAY_2, RATES, ACCELERATION, INTEGRAL, TORQUE, UNALLOCATED = range(7)
@@ -65,7 +65,7 @@ def alpha(sample_rate: float, cutoff: float) -> float:
     return dt / (dt + 1.0 / (2.0 * math.pi * cutoff))
 
 
-@jit
+@borrowing
 def filter_gyro(gyro: np.ndarray, dt: float, filters: np.ndarray, memory: np.ndarray) -> None:
     """Advance DELAY_1, DELAY_2, RATES, ACCELERATION of memory (7, 3) by one sample.
 
@@ -93,7 +93,7 @@ def reset_filters(gyro: np.ndarray, filters: np.ndarray, memory: np.ndarray) -> 
     memory[ACCELERATION] = 0.0
 
 
-@jit
+@borrowing
 def rate_torque(
     setpoint: np.ndarray,
     dt: float,

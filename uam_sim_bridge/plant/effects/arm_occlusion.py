@@ -85,7 +85,7 @@ def seen_markers(
     return total
 
 
-@jit
+@borrowing
 def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
     """Return the distance [m] of the segments a-b and c-d, all points (3,) [m]."""
     uu, vv, uv, uw, vw = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.compiled import borrowing
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
 
 LOWEST = 0.5  # [1] of the radius: the formula is not valid below
@@ -43,7 +43,7 @@ class GroundEffect(Effect):
         return _GroundEffect(bench, shape)
 
 
-@jit
+@borrowing
 def thrust_ratio(height: float, shape: np.ndarray) -> float:
     """Return thrust / thrust far from the floor at `height` [m] of the rotor above the floor.
 
@@ -59,7 +59,7 @@ def thrust_ratio(height: float, shape: np.ndarray) -> float:
     return 1.0 + strength * (1.0 / (1.0 - loss) - 1.0)
 
 
-@jit
+@borrowing
 def raise_thrust(
     base: np.ndarray, axes: np.ndarray, positions: np.ndarray, shape: np.ndarray, lift: np.ndarray
 ) -> None:

@@ -24,7 +24,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, each, size
 
@@ -89,7 +89,7 @@ def act(a: tuple) -> int:
     return 0
 
 
-@jit
+@borrowing
 def braked(gear: Gear, i: int, torque: float, speed: float, free: float) -> float:
     """Return the change of the momentum by friction in a step [N m s], at the speed [rad/s].
 
@@ -105,14 +105,14 @@ def braked(gear: Gear, i: int, torque: float, speed: float, free: float) -> floa
     return -math.copysign(min(limit, abs(free)), free)
 
 
-@jit
+@borrowing
 def rigid_step(gear: Gear, torque: np.ndarray, speed: np.ndarray) -> None:
     """Take the friction of a physics step from torque (n,) [N m]; speed (n,) [rad/s]."""
     for i in range(len(torque)):
         torque[i] += braked(gear, i, torque[i], speed[i], 0.0) / gear.constants[6]
 
 
-@jit
+@borrowing
 def gear_step(
     gear: Gear, torque: np.ndarray, alpha: np.ndarray, alpha_dot: np.ndarray, output: np.ndarray
 ) -> None:

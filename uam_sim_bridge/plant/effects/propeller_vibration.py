@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.compiled import borrowing
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
 from uam_sim_bridge.plant.vehicle import BASE
 
@@ -61,7 +61,7 @@ class Shaken(NamedTuple):
     period: float
 
 
-@jit
+@borrowing
 def mean_of_wave(phase: float, angle: float) -> tuple[float, float]:
     """Return the means of cos and sin over the phases from `phase` to `phase + angle` [rad]."""
     if abs(angle) < 1e-6:
