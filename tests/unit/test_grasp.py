@@ -369,6 +369,16 @@ def test_a_lost_payload_is_noticed_and_located():
     assert last.grasp is Grasp.LOST and "(0.10, 0.00, 0.04) m" in last.text
 
 
+def test_it_looks_less_often_where_it_has_nothing_to_decide():
+    flight = Flight(lambda attempt: True)
+    flight.until(33.0)
+    assert flight.executive.period == pytest.approx(0.02)
+    flight.until(55.0)
+    assert flight.executive.period == pytest.approx(0.1)
+    flight.until(flight.windows[0].release)
+    assert flight.executive.period == pytest.approx(0.02)
+
+
 def test_a_contact_is_left_upwards():
     flight = Flight(lambda attempt: False)
     flight.until(36.0)
