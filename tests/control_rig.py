@@ -6,7 +6,7 @@ from uam_control.mission import load_scenario
 from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.timing import Timing
@@ -55,13 +55,13 @@ class Port:
 class Rig:
     """A control tick on a vehicle that stands still."""
 
-    def __init__(self, **section):
+    def __init__(self, law="modular", **section):
         """section: parameters of the bridge."""
         vehicle = load_description()
         sequence = OffboardSequence()
         self.port = Port(sequence)
         bridge = BridgeStage(BridgeSets.of(vehicle, section), vehicle, self.port, sequence)
-        sets = load_profile("s500").sets
+        sets = default_profile(law).sets
         self.control = ControlTick.of(load_scenario("hover"), sets, bridge, Timing())
         self.signals = self.control.signals
         self.stamp = 0

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.control.whole_body import WholeBody
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, StartParameters, load_scenario
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile
 from uam_control.stamps import SECOND
 from uam_control.supervision import Readings
-from uam_lab.flights.ros.node_arguments import FUSED
+from uam_lab.flights.ros.node_arguments import FUSED, WHOLE_BODY
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,
@@ -30,6 +31,7 @@ from uam_msgs_py.node.wiring import BRIDGE
 COORDINATES = coordinates(2)
 JOINTS = arm_coordinates(2)
 
+WHOLE_BODY_L1 = "whole_body_l1"
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later
 TICKS = 200
@@ -60,9 +62,9 @@ def samples():
         )
 
 
-def expected():
+def expected(law):
     """Return the maths' results for `samples`: state, tau_p, tau_q (None: idle), tau_alpha."""
-    sets = load_profile("s500").sets
+    sets = default_profile(law).sets
     estimator = StateEstimator(sets["state_estimator"], 2)
     parameters = replace(sets["mission"], start_speed=SHAKEN)
     starts = StartParameters(auto_start=True)
@@ -71,7 +73,7 @@ def expected():
     position = PositionController(sets["position_controller"])
     attitude = AttitudeController(sets["attitude_controller"])
     arm = ArmController(sets["arm_controller"])
-    dt = PERIOD / SECOND
+    whole, dt = WholeBody(position, attitude, arm), PERIOD / SECOND
     for stamp, imu, pose, joints in samples():
         time = stamp / SECOND
         if pose is not None:
@@ -81,10 +83,18 @@ def expected():
         state = estimator.update()
         output = mission.output
         flying = output.flying
-        tau_p = position.update(state, output.reference, flying, dt).copy()
-        desired = position.attitude_reference
-        tau_q = attitude.update(state, output.reference, desired, flying, dt).copy()
-        tau_alpha = arm.update(state, output.reference, desired, flying, dt).copy()
+        if law == WHOLE_BODY_L1 and flying:
+            whole.update(state, output.reference, dt)
+            of = whole.arrays
+            outputs = (one.all.tau for one in (of.position, of.attitude, of.arm))
+        else:
+            desired = position.attitude_reference
+            outputs = (
+                position.update(state, output.reference, flying, dt),
+                attitude.update(state, output.reference, desired, flying, dt),
+                arm.update(state, output.reference, desired, flying, dt),
+            )
+        tau_p, tau_q, tau_alpha = (one.copy() for one in outputs)
         yield state.copy(), tau_p if flying else None, tau_q if flying else None, tau_alpha
         armed = ARMED_AT / SECOND if stamp >= ARMED_AT else None
         mission.step((stamp + PERIOD) / SECOND, state, armed, known)
@@ -171,22 +181,28 @@ class Plant:
         )
 
 
-def start_separately(start):
+def start_separately(start, law):
     started = ("--ros-args", "-p", "auto_start:=true", "-p", f"start_speed:={SHAKEN}")
-    for name in NODES:
+    whole = law == WHOLE_BODY_L1
+    for name in NODES[:2] if whole else NODES:
         start(f"uam_control.nodes.{name}", *(started if name == "mission" else ()))
+    if whole:
+        laws = (word for name in NODES[2:] for word in ("-p", f"{name}:law:={law}"))
+        start(WHOLE_BODY, "--ros-args", *laws)
 
 
-def start_fused(start):
+def start_fused(start, law):
     given = {"mission:auto_start": "true", "mission:start_speed": SHAKEN}
+    given |= {f"{name}:law": law for name in NODES[2:]}
     given["flight_controller:without"] = BRIDGE
     words = (word for name, value in given.items() for word in ("-p", f"{name}:={value}"))
     start(FUSED, "--ros-args", *words)
 
 
+@pytest.mark.parametrize("law", ["modular", WHOLE_BODY_L1])
 @pytest.mark.parametrize("layout", [start_separately, start_fused])
-def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe, layout):
-    layout(start)
+def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe, layout, law):
+    layout(start, law)
     plant = Plant(probe)
     plant.wait_for_connections()
     for number, sample in enumerate(samples()):
@@ -194,7 +210,7 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe, layout)
     probe.until(lambda: len(plant.references) > TICKS, "the reference of the tick after the last")
 
     airborne = 0
-    for i, (state, tau_p, tau_q, tau_alpha) in enumerate(expected()):
+    for i, (state, tau_p, tau_q, tau_alpha) in enumerate(expected(law)):
         stamp = (i + 1) * PERIOD
         at, published = read_state(plant.states[i])
         assert at == stamp

@@ -26,6 +26,21 @@ def test_the_stages_are_those_of_the_block_diagram():
     ]
 
 
+def test_a_law_of_the_whole_body_is_one_stage():
+    rig = Rig("whole_body_l1")
+    names = [stage.name for stage in rig.control.stages]
+    assert names[2:5] == ["mission", "whole body", "bridge"]
+    rig.run(3.0)
+    signals, laws = rig.signals, rig.control.laws.values()
+    assert signals.flying and signals.tau_p[2] > 0.0
+    outputs = signals.tau_p, signals.tau_q, signals.tau_alpha
+    for output, law in zip(outputs, laws, strict=True):
+        assert output is law.controller.arrays.all.tau
+        assert law.controller.adaptation.any(), "the rates stay, against what is predicted"
+    desired = rig.control.position.controller.attitude_reference
+    np.testing.assert_array_equal(signals.attitude_reference, desired)
+
+
 def test_a_further_stage_comes_before_the_one_named():
     rig, seen = Rig(), []
     rig.control.insert("bridge", "probe", lambda tick: not seen.append(tick.signals.stamp))

@@ -7,14 +7,13 @@ from uam_control.control.controllers import ArmController
 from uam_control.control.hand_steering import IDLE, TEXTS
 from uam_control.control.output_limits import ArmLimits
 from uam_control.coordinates import ARM
-from uam_control.nodes.controller_node import ControllerNode
+from uam_control.nodes.controller_node import ControllerNode, run_alone
 from uam_control.stages.hand_stage import HandStage
 from uam_control.vehicle import POSITION_SERVO
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import TorqueWriter
 from uam_msgs_py.messages.convert import JointCommandWriter
 from uam_msgs_py.messages.status import WARN
-from uam_msgs_py.node.base_node import run
 
 NAME = "arm_controller"
 
@@ -59,4 +58,4 @@ class ArmControllerNode(ControllerNode):
 
 def main() -> int:
     """Run the node; return its exit status."""
-    return run(ArmControllerNode, NAME)
+    return run_alone(ArmControllerNode, NAME)

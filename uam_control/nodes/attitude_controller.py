@@ -6,12 +6,11 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.control.controllers import AttitudeController
-from uam_control.nodes.controller_node import ControllerNode
+from uam_control.nodes.controller_node import ControllerNode, run_alone
 from uam_control.stages.law_stages import MeasuredDelay
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, TorqueWriter
 from uam_msgs_py.messages.status import AutopilotState
-from uam_msgs_py.node.base_node import run
 from uam_msgs_py.node.namespace import frame
 
 NAME = "attitude_controller"
@@ -41,4 +40,4 @@ class AttitudeControllerNode(ControllerNode):
 
 def main() -> int:
     """Run the node; return its exit status."""
-    return run(AttitudeControllerNode, NAME)
+    return run_alone(AttitudeControllerNode, NAME)

@@ -13,6 +13,7 @@ from uam_control.control.controllers import Controller
 from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.timing import Timing
@@ -27,9 +28,10 @@ from uam_msgs_py.messages.control import (
     read_state,
 )
 from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.node_names import WHOLE_BODY
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node.base_node import UamNode
+from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Ahead, StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 from uam_msgs_py.node.tick_times import DECODE, STAGE
@@ -63,9 +65,9 @@ class ControllerNode(UamNode):
         self.parameter_set.apply = self.controller.set_parameters
         attitude = () if last is topics.STATE else (NO_COMMAND.attitude,)
         nothing = np.zeros((3, len(self.vehicle.coordinates)))
-        spare = LawStage(controller(self.parameter_set.current), timing)
+        self.spare = LawStage(controller(self.parameter_set.current), timing)
         for flying in (False, True):  # compiles the law: the first call takes a second
-            spare.update(0, nothing, nothing, *attitude, flying)
+            self.spare.update(0, nothing, nothing, *attitude, flying)
         self._command, self._adaptation = self.publisher(command), self.publisher(adaptation)
         self._gains = JointStateWriter(self.controller.names)
         inputs = [topics.STATE, topics.REFERENCE]
@@ -154,6 +156,21 @@ class ControllerNode(UamNode):
         level, summary, values = super().diagnose()
         gains = {name: f"{value:.4g}" for name, value in self._adapted().items()}
         return level, summary, values | gains | {"saturated": self.controller.saturated}
+
+
+def run_alone(kind: Callable[[], ControllerNode], name: str) -> int:
+    """Run a controller in a process of its own, as `run`."""
+
+    def make() -> ControllerNode:
+        node = kind()
+        if node.controller.law.whole:
+            raise ParameterError(
+                f"law: {node.controller.parameters.law} is one law of all three controllers: start "
+                f"{WHOLE_BODY} in their place"
+            )
+        return node
+
+    return run(make, name)
 
 
 def _later(reference: Reference, step: int) -> Reference:

@@ -3,10 +3,9 @@
 import numpy as np
 
 from uam_control.control.controllers import PositionController
-from uam_control.nodes.controller_node import ControllerNode
+from uam_control.nodes.controller_node import ControllerNode, run_alone
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter
-from uam_msgs_py.node.base_node import run
 
 NAME = "position_controller"
 
@@ -27,4 +26,4 @@ class PositionControllerNode(ControllerNode):
 
 def main() -> int:
     """Run the node; return its exit status."""
-    return run(PositionControllerNode, NAME)
+    return run_alone(PositionControllerNode, NAME)

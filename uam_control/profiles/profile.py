@@ -104,6 +104,11 @@ class Profile:
         """Return controller → law."""
         return {node: self.sets[node].law for node in CONTROLLERS}
 
+    @property
+    def whole(self) -> bool:
+        """Whether the controllers have a law of the whole body."""
+        return all(catalogue.law(law).whole for law in self.laws().values())
+
 
 def servo_mode(profile: Profile) -> dict[str, str]:
     """Return the change of the vehicle's numbers that the arm controller's setpoints require."""

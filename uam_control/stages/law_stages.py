@@ -202,6 +202,27 @@ class WholeBodyStage:
         self._law.update(state, reference, steps[POSITION])
 
 
+class WholeBodyPart:
+    """What a node has of a `WholeBodyStage` in place of its stage; the first one computes it."""
+
+    def __init__(self, whole: WholeBodyStage, number: int) -> None:
+        """number: of the node's own stage."""
+        self._whole, self._own, self._first = whole, whole.stages[number], number == 0
+
+    @property
+    def gains_due(self) -> bool:
+        """See `LawStage`."""
+        return self._own.gains_due
+
+    def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
+        """See `LawStage.update`; state, reference and flying count."""
+        if not inputs[-1]:
+            return self._own.update(stamp, *inputs)
+        if self._first:
+            self._whole.update(stamp, *inputs[:2])
+        return self._own.controller.arrays.all.tau
+
+
 @cache
 def whole_body_step(law: Callable) -> Callable[[tuple], int]:
     """Return the compiled step of `control_tick.control_whole_body` with a law of all three."""
@@ -209,18 +230,19 @@ def whole_body_step(law: Callable) -> Callable[[tuple], int]:
     @borrowing
     def control(a: tuple) -> int:
         s, (w, stages), inputs = a
-        laws, stamp = (w.position.all, w.attitude.all, w.arm.all), s.numbers[0].stamp
-        if not (laws[0].numbers[0].flying and laws[1].numbers[0].flying):
+        p, q, r = w.position.all, w.attitude.all, w.arm.all
+        if not (p.numbers[0].flying and q.numbers[0].flying):
             return DECIDE
+        stamp = s.numbers[0].stamp
         dt = step_to(stages[POSITION], stamp)
         step_to(stages[ATTITUDE], stamp)
         step_to(stages[ARM], stamp)
         law(w, s.state, s.reference, dt)
         for row in range(3):
             put(w.position.attitude[row], s.attitude_reference[row])
-        for number in range(3):
-            adaptation = laws[number].law.adaptation
-            keep_gains(stages[number], inputs, number, stamp, adaptation)
+        keep_gains(stages[POSITION], inputs, POSITION, stamp, p.law.adaptation)
+        keep_gains(stages[ATTITUDE], inputs, ATTITUDE, stamp, q.law.adaptation)
+        keep_gains(stages[ARM], inputs, ARM, stamp, r.law.adaptation)
         return DONE
 
     return control

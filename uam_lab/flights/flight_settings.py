@@ -174,6 +174,8 @@ def checked(o: FlightOptions) -> FlightSettings:
     source = str(configuration.named("scenarios", str(o.scenario)))
     scenario = load_scenario(source, vehicle, scenario_options)
     profile, own = _profile(o, vehicle, namespace)
+    if profile.whole and (alone := [node for node in without if node in profile.laws()]):
+        raise SettingsError(f"without {alone[0]}: {o.controller} is one law of all controllers")
     mass = scenario.payload_mass if o.payload_mass is None else o.payload_mass
     feasible = Feasibility(vehicle, profile.sets["mission"], mass)
     slower: tuple[str, ...] = ()

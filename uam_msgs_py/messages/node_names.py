@@ -9,4 +9,6 @@ CHECKLIST = "checklist"  # of a real vehicle only
 # Nodes that one process may have, in the order in which they act in a tick; and its own node
 FUSED = (ESTIMATOR, MISSION, POSITION, ATTITUDE, ARM, BRIDGE)
 FLIGHT_CONTROLLER = "flight_controller"
+# Those of a law of the whole body are one process
+CONTROLLERS, WHOLE_BODY = (POSITION, ATTITUDE, ARM), "whole_body_controller"
 FLIGHT = "uam_fly"  # the node of `uam fly` itself

@@ -22,6 +22,7 @@ from uam_msgs_py.messages.node_names import (  # noqa: F401  for all that speak 
     BRIDGE,
     CHECKLIST,
     COCKPIT,
+    CONTROLLERS,
     ESTIMATOR,
     FLIGHT,
     FLIGHT_CONTROLLER,
@@ -33,6 +34,7 @@ from uam_msgs_py.messages.node_names import (  # noqa: F401  for all that speak 
     POSITION,
     RECORDER,
     SCENE,
+    WHOLE_BODY,
 )
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 from uam_msgs_py.node.namespace import expanded

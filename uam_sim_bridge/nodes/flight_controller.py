@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from uam_control.nodes import whole_body_controller
 from uam_control.nodes.arm_controller import ArmControllerNode
 from uam_control.nodes.attitude_controller import AttitudeControllerNode
 from uam_control.nodes.mission import MissionNode
@@ -75,8 +76,13 @@ class FlightControllerNode(UamNode):
     def join(self, nodes: Mapping[str, UamNode]) -> None:
         """Join the nodes of the process to one tick, if they are a whole one."""
         self._last = [self, *nodes.values()][-1]
+        laws = [nodes[name] for name in wiring.CONTROLLERS if name in nodes]
         if is_whole(nodes):
             self.fused = FusedTick(self, nodes)
+        elif any(node.controller.law.whole for node in laws):
+            if len(laws) < len(wiring.CONTROLLERS):
+                raise ParameterError("without: a law of the whole body needs all controllers")
+            whole_body_controller.join(laws)
         self._thin(self.parameter_set.current)
 
     def _thin(self, parameters: FlightControllerParameters) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from rclpy.subscription import Subscription
 
 from uam_control.coordinates import ALPHA
+from uam_control.nodes.whole_body_controller import compile_whole
 from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.step import Stage
 from uam_control.stamps import SECOND
@@ -166,15 +167,20 @@ class FusedTick:
     def _arrange(self) -> None:
         """Put the nodes' parts between the stages of the tick."""
         tick = self._tick
-        laws = dict(zip(("position law", "attitude law", "arm law"), self._laws, strict=True))
-        counted = {"estimator": self._estimator, "bridge": self._bridge, **laws}
+        laws = ["position law", "attitude law", "arm law"]
+        if tick.whole is not None:
+            laws = ["whole body"] * len(laws)
+            compile_whole(self._laws)
+        counted = ("estimator", *laws, "bridge")
+        nodes = (self._estimator, *self._laws, self._bridge)
         stages = {stage.name: stage.run for stage in tick.stages}
         stages["estimator"] = self._estimating(stages["estimator"])
-        stages |= {name: _counted(node, stages[name]) for name, node in counted.items()}
+        for name, node in zip(counted, nodes, strict=True):
+            stages[name] = _counted(node, stages[name])
         tick.stages[:] = [Stage(name, run) for name, run in stages.items()]
         tick.insert("mission", "newest ticks", lambda tick: not self._behind)
         tick.insert("mission", "wall clock", self._note_time)
-        tick.insert("position law", "status", self._tell)
+        tick.insert(laws[0], "status", self._tell)
         tick.insert("bridge", "link", self._begin_link)
         answer = self._process.times.measured(self._answer)
         tick.insert("next reference", "answers", lambda tick: answer() is None)

@@ -116,7 +116,7 @@ def _start(
             arguments + node_arguments.process_remappings(settings, name),
             may_end=name == wiring.PLANT,
             optional=name in ONLOOKERS,
-            again=supervise.RESTARTS if name in CONTROLLERS else 0,
+            again=supervise.RESTARTS if name in (*CONTROLLERS, wiring.WHOLE_BODY) else 0,
             nodes=node_arguments.nodes_in(name, settings),
             place=placing(settings, ports.instance, name),
         )

@@ -12,7 +12,8 @@ from uam_lab.flights.direct.warm_up import warm_up
 from uam_lab.flights.ros import node_arguments
 from uam_msgs_py.node import log_callers
 
-for module in (*node_arguments.MODULES.values(), node_arguments.FUSED):
+hosts = (module for module, _ in node_arguments.HOSTS.values())
+for module in (*node_arguments.MODULES.values(), *hosts):
     importlib.import_module(module)
 warm_up([catalogue.DEFAULT])
 log_callers.find_modules()

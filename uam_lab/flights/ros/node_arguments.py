@@ -39,7 +39,13 @@ MODULES = {
     wiring.SCENE: "uam_lab.cockpit.scene",
     wiring.COCKPIT: "uam_lab.cockpit.cockpit_node",
 }
-FUSED = "uam_sim_bridge.nodes.flight_controller"  # module of the nodes wiring.FUSED in one process
+FUSED = "uam_sim_bridge.nodes.flight_controller"
+WHOLE_BODY = "uam_control.nodes.whole_body_controller"
+# process of several nodes → its module, its nodes
+HOSTS = {
+    wiring.FLIGHT_CONTROLLER: (FUSED, wiring.FUSED),
+    wiring.WHOLE_BODY: (WHOLE_BODY, wiring.CONTROLLERS),
+}
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
@@ -225,27 +231,27 @@ def scenario_source(settings: FlightSettings) -> str:
 def modules(settings: FlightSettings) -> dict[str, str]:
     """Return the processes of a flight: executable → module."""
     found = {name: module for name, module in MODULES.items() if name not in settings.without}
-    return arranged(found, settings.fused)
+    return arranged(found, settings.fused, settings.profile.whole)
 
 
-def arranged(modules: dict[str, str], fused: bool) -> dict[str, str]:
-    """Return the processes of the nodes `modules`; fused: the control nodes are one process."""
-    if not fused:
+def arranged(modules: dict[str, str], fused: bool, whole: bool) -> dict[str, str]:
+    """Return the processes of the nodes `modules`; fused: the control nodes are one process; whole:
+    the controllers are, of a law of the whole body."""
+    host = wiring.FLIGHT_CONTROLLER if fused else wiring.WHOLE_BODY if whole else ""
+    if not host:
         return modules
-    found: dict[str, str] = {}
-    for name, module in modules.items():
-        if name in wiring.FUSED:
-            found[wiring.FLIGHT_CONTROLLER] = FUSED
-        else:
-            found[name] = module
-    return found
+    one, inside = HOSTS[host]
+    return {
+        host if name in inside else name: one if name in inside else module
+        for name, module in modules.items()
+    }
 
 
 def nodes_in(process: str, settings: FlightSettings) -> tuple[str, ...]:
     """Return the nodes of a process that `modules` names."""
-    if process != wiring.FLIGHT_CONTROLLER:
+    if process not in HOSTS:
         return (process,)
-    return tuple(name for name in wiring.FUSED if name not in settings.without)
+    return tuple(name for name in HOSTS[process][1] if name not in settings.without)
 
 
 def fused_line(settings: FlightSettings) -> str:
@@ -256,7 +262,7 @@ def fused_line(settings: FlightSettings) -> str:
 
 def process_remappings(settings: FlightSettings, process: str) -> list[str]:
     """Return the ROS arguments with the remappings of a process; those of its nodes come first."""
-    if process != wiring.FLIGHT_CONTROLLER:
+    if process not in HOSTS:
         return remappings(settings, process)
     own = [
         word

@@ -19,7 +19,7 @@ from uam_msgs_py.node import wiring
 
 FIRST_CORE = {
     wiring.FLIGHT_CONTROLLER,
-    *(wiring.ESTIMATOR, wiring.POSITION, wiring.ATTITUDE, wiring.BRIDGE),
+    *(wiring.ESTIMATOR, wiring.POSITION, wiring.ATTITUDE, wiring.WHOLE_BODY, wiring.BRIDGE),
 }
 YIELDING = {wiring.RECORDER, *ONLOOKERS}
 ANSWERING = {wiring.PLANT, AUTOPILOT}

@@ -30,7 +30,7 @@ from uam_sim_bridge.ports import Ports, Reservation
 
 LAB_COPY = "lab.yaml"
 AGAIN = (
-    *CONTROLLERS,
+    *(*CONTROLLERS, wiring.WHOLE_BODY),
     *vehicle_nodes.DRIVERS,
     vehicle_nodes.CHECKLIST,
 )  # nodes that are restarted after a loss

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from uam_control.offboard.autopilot_magnet import NONE
+from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import POSITION_SERVO
 from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import ONLOOKERS
@@ -41,7 +42,8 @@ def modules(lab: Lab) -> dict[str, str]:
 
 def processes(lab: Lab) -> dict[str, str]:
     """Return the processes of a vehicle, in the order of the start."""
-    return node_arguments.arranged(modules(lab), lab.fused)
+    whole = bool(lab.profile) and load_profile(*lab.profile, vehicle=lab.vehicle).whole
+    return node_arguments.arranged(modules(lab), lab.fused, whole)
 
 
 def parameters(
