@@ -10,12 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.arm.chain import Chain
+from uam_control.arm.hand import hands
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
 from uam_control.grasp.evidence import Evidence, fused
 from uam_control.grasp.grippers import GRIPPERS
 from uam_control.grasp.windows import Approach
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.motion.trajectory import Move
+from uam_control.mission.scenarios.scenario import standing
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleError, chain_of, derived_parameters, load_description
 from uam_sim_bridge.plant import Vehicle
@@ -174,6 +176,21 @@ def test_an_approach_from_the_side_is_the_last_move_along_it():
     assert (window.descent, window.lifted, window.departure) == (10.0, 18.0, 31.0)
     assert window.back == pytest.approx((-0.2, 0.0, 0.0)) and window.approach is side
     assert grasp_windows(path, [(13.0, True), (30.0, False)]) == ()  # none from above
+
+
+def test_the_tip_comes_to_the_stem_and_sets_it_down_at_the_published_places():
+    """Pillar of 1.008 m, basket of 0.065 m, claw 0.16 m above its middle: 1.2005 m; down to 10 mm
+    less. The tip ends 12 mm behind the stem, from a tenth of a metre before it."""
+    vehicle = load_description("t650_gripper")
+    scenario, chain = load_scenario("pillars", vehicle), chain_of(vehicle)
+    (window,) = grasp_windows(scenario.motions, scenario.magnet, dict(scenario.approaches))
+    assert (window.descent, window.lifted) == (21.5, 27.2)
+    assert window.back == pytest.approx((-0.1, 0.0, 0.0))
+    path = scenario.trajectory(standing(scenario.arm_start))
+    chi = path.rows(np.array([window.grip, window.release]), 1)[0]
+    tip = hands(chain, chi)[:, :3]
+    assert tip[0] == pytest.approx([1.012, 1.0, 1.2005], abs=2e-4)
+    assert tip[1] == pytest.approx([-1.012, -1.0, 1.1905], abs=2e-4)
 
 
 def test_a_payload_beside_the_way_from_the_side_breaks_the_approach_off():
