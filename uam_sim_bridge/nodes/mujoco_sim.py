@@ -50,21 +50,19 @@ from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
-from uam_sim_bridge.nodes.awaited import REPORTS, Awaited
+from uam_sim_bridge.nodes.awaited import Awaited
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
+from uam_sim_bridge.nodes.lockstep import Lockstep, PlantStopped
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import (
-    SETPOINT,
     Answers,
     RecorderProgress,
     Sensors,
     TruthTopics,
     nanoseconds,
-    suspected,
 )
-from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import PhysicsError, Plant, Vehicle
@@ -78,17 +76,9 @@ REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 SILENT = 10.0  # [s] longest wait for the motor commands of an autopilot that may be silent
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
-RECORDER_LAG = SECOND  # [ns] receive buffers have room for more, see config/dds/fastdds.xml
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
-# [s], [ticks]: single samples of the autopilot's IMU may be lost. After these ticks time goes on at
-# the pace of the wall clock: without it the bridge could not relate the clocks again.
-IMU_WAIT, IMU_MISSING = 2.0, 3
 SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
-
-
-class PlantStopped(RuntimeError):
-    """The flight cannot go on; the text is one line and names the node that did not answer."""
 
 
 class NotReady(PlantStopped):
@@ -125,7 +115,8 @@ class Simulator:
         self.answers = Answers(node, described, declared.rightful, servo_mode)
         self.connections = Connections(node)
         self.recorded = RecorderProgress(node, declared.rightful)
-        self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._any_input_wakes)
+        last = [topics.SETPOINT.name]
+        self.executor = LeanExecutor(node, last, lambda: self._lockstep.any_input_wakes)
         patience = self._limit = options.answer_timeout or math.inf  # [s] of a wait
         rotors = len(described.rotors)
         waits = HilParameters(answer_timeout=min(patience, SILENT))
@@ -141,15 +132,13 @@ class Simulator:
         pairs = [entry.partition("=") for entry in options.foreign.split(",") if entry]
         self._own_names = {node: name or node for node, _, name in pairs}
         self._foreign = tuple(self._own_names.values())
-        self._any_input_wakes = False  # else the setpoint alone: usually the last answer to arrive
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
-        self._unanswered = 0  # ticks in a row without an answer
-        self._patience = Patience(patience)
         needed = wiring.reporting(options.recorded, self._own_names)
         self._awaited = Awaited(self.connections, needed, self._tell)
+        period, heard = self.plant.period, (self.answers, self.recorded, self._awaited)
+        self._lockstep = Lockstep(node, self.executor, options, stop, period, *heard)
         self._published = 0  # wall time [ns] of its publication
-        self._restart = Restart(patience)
         self._begun = 0.0  # wall time [s] at which this tick began
         latest = options.let_go or math.inf
         self._clock = PacedClock(self.plant.period, catch_up=CATCH_UP, latest=latest)
@@ -267,13 +256,13 @@ class Simulator:
                 self._measure()
                 self._receive_hil(0.0)
             elif self.options.publish_imu:
-                self._wait_for_answers()
+                self._lockstep.wait(self._stamp, self._begun, self.plant.time)
                 self.hil.flush()
                 self._receive_hil()
             else:
                 self.hil.flush()
                 self._receive_hil()
-                self._wait_for_answers()
+                self._lockstep.wait(self._stamp, self._begun, self.plant.time)
             if self._faulty:
                 stamp, mission = self.answers.mission_stamp * 1e-9, self.answers.mission
                 self._faulty.mission_at(stamp, mission.time, mission.phase)
@@ -306,7 +295,8 @@ class Simulator:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
         last = LAST_WAIT if realtime else self._limit
-        self._recorder_has_caught_up(0, last)  # unread messages are lost when the node ends
+        # unread messages are lost when the node ends
+        self._lockstep.recorder_has_caught_up(0, last)
 
     def _begin_tick(self) -> None:
         """Publish the samples and the truth of this tick, and prepare those of the autopilot."""
@@ -368,74 +358,6 @@ class Simulator:
         self._log.warning(f"waiting for the autopilot on TCP port {self.options.hil_port}{again}")
         while not self._stop.raised and not self.hil.accept(0.0):
             self.executor.spin_once(0.05)
-
-    def _wait_for_answers(self) -> None:
-        if not self._recorder_has_caught_up(RECORDER_LAG, self._limit):
-            raise PlantStopped(
-                f"nothing recorded since {self.recorded.until / SECOND:g} s; the recorder is silent"
-            )
-        if self._stop.raised:
-            return
-        if self._stamp is None:
-            if self.options.publish_imu:
-                return
-            if not self.answers.begun:
-                self._spin_until(self._begun + self.plant.period)
-                return
-        own_imu = self._stamp is not None
-        if own_imu or not self._unanswered:
-            self._patience = Patience(self._limit)
-            self._awaited.begin()
-        slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
-        while missing := self.answers.missing(self._stamp):
-            self._any_input_wakes = SETPOINT not in missing
-            left = self._begun + self.plant.period - time.monotonic()
-            hurried = self._restart.going_on or not slack
-            self.executor.spin_once(max(0.0, left) if hurried else 0.1)
-            self._restart.look(self.answers.restarts)
-            if self._stop.raised or (self._restart.going_on and left <= 0.0):
-                break
-            over = self._patience.over or self._awaited.lost
-            self._awaited.told(lambda: f"{' and '.join(sorted(missing))}{suspected(missing)}")
-            if not own_imu and left < -slack and not over:
-                break  # samples of the autopilot's IMU may be lost or refused
-            if over:
-                if self.options.end_with_mission:
-                    raise PlantStopped(self._no_answer(missing))
-                self._log.warning(f"{self._no_answer(missing)}; time goes on without it")
-                self._restart.begin(math.inf)
-        self._unanswered = self._unanswered + 1 if missing else 0
-        self._restart.tick(complete=not missing)
-
-    def _spin_until(self, end: float) -> None:
-        """Serve messages until the wall time `end` [s]."""
-        while (left := end - time.monotonic()) > 0.0 and not self._stop.raised:
-            self.executor.spin_once(left)
-
-    def _recorder_has_caught_up(self, lag: int, patience: float) -> bool:
-        """Wait until the recorder is at most `lag` [ns] behind; return False after `patience`.
-
-        patience: longest wait [s of wall time].
-        """
-        waiting, until = Patience(patience), -1
-        while self.options.recorded and not self._stop.raised:
-            if self.node.stamp - self.recorded.until <= lag:
-                break
-            if self.recorded.until != until:
-                until = self.recorded.until
-                self._awaited.begin()
-            if waiting.over or self._awaited.lost:
-                return False
-            self._awaited.told(lambda: wiring.RECORDER)
-            self._any_input_wakes = True
-            self.executor.spin_once(0.1)
-        return True
-
-    def _no_answer(self, missing: frozenset[str]) -> str:
-        limit = self.options.answer_timeout
-        since = f"within {limit:g} s" if limit else f"in {REPORTS} reports of every node"
-        what = f"no {' and no '.join(sorted(missing))} for t = {self.plant.time:.3f} s"
-        return f"{what} {since}{suspected(missing)}"
 
     def _wait_until(self, deadline: float) -> None:
         left = deadline - time.monotonic()
