@@ -28,7 +28,7 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 AT_ONCE := -n 4 --dist loadgroup --no-loadscope-reorder
 MARKS := not slow and not long
 test: setup      ## all but the long and the slow tests; options: make test ARGS="tests/unit -x"
-	@$(BIN)/python -m uam_lab.flights.direct.warm_up --all-laws
+	@$(BIN)/python -m uam_lab.flights.direct.warm_up
 	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "$(MARKS)" $(AT_ONCE) tests)
 
 long: setup      ## further flights, moments and seeds, examples among them; ten minutes more

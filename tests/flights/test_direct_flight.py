@@ -101,6 +101,8 @@ def test_a_magnet_weaker_than_the_payload_lifts_nothing():
 @pytest.mark.parametrize("profile", ["asmc1", "asmc2"])
 def test_the_reconstructed_baselines_take_off_hover_and_land(profile):
     a_flight = flight("hover", profile, payload=0.0)
+    # a stage in Python splits the loop, whose compilation for a law takes longer than the flight
+    a_flight.control.insert("position law", "nothing", lambda control: True, decides=False)
     a_flight.run()
     result = metrics(a_flight, payload=0.0)
     assert result["mission_completed"], result["shortfalls"]

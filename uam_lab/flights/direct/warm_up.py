@@ -42,10 +42,7 @@ from uam_sim_bridge.plant.effects import presets
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
 FURTHER = [law for law in LAWS if law != catalogue.DEFAULT]
-# laws whose loop is compiled beforehand: the paper's baselines; the others at their first flight
-OTHERS = [law for law, one in LAWS.items() if one.profile and law != catalogue.DEFAULT]
-# options of this module as a program; further words are names of laws
-BESIDE, ALL_LAWS = "--beside", "--all-laws"
+BESIDE = "--beside"  # as an option of this module as a program; other words are names of laws
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
@@ -162,12 +159,8 @@ def _others() -> None:
 if __name__ == "__main__":
     if BESIDE in sys.argv:
         warm_up(FURTHER)
-        sys.exit()
-    prepare(print)
-    for name in [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT]:
-        if active():
-            _fly_direct(name, print)
-    others = [law for law in OTHERS if ALL_LAWS in sys.argv]
-    command = [sys.executable, "-m", "uam_lab.flights.direct.warm_up"]
-    beside = [subprocess.Popen([*command, law]) for law in others]  # each on a core
-    sys.exit(max((one.wait() for one in beside), default=0))
+    else:
+        prepare(print)
+        for name in [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT]:
+            if active():
+                _fly_direct(name, print)
