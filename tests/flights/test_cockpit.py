@@ -160,6 +160,12 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
     page.get_by_role("button", name="Go", exact=True).click()
     expect(page.get_by_text("goal_pose: accepted")).to_be_visible()
 
+    page.get_by_text("Hand", exact=True).click()
+    page.get_by_role("button", name="Marker at the hand").click()
+    expect(page.get_by_text("within reach")).to_be_visible()
+    page.get_by_role("button", name="Go with the hand").click()
+    expect(page.get_by_text("end_effector/goal_pose: accepted")).to_be_visible()
+
     page.get_by_role("button", name="Freeze adaptation").click()
     until(lambda: value_in(flight, "arm_controller", "adapt") is False, "adaptation is frozen")
     expect(page.get_by_text("frozen: arm_controller, attitude_controller")).to_be_visible()

@@ -128,6 +128,15 @@ def test_a_pose_is_reached_by_base_and_arm_together(name, wanted):
     flight.assert_smooth()
 
 
+@pytest.mark.parametrize("yaw", [0.3, 1.1, 2.9])
+def test_a_goal_with_the_base_at_the_corner_of_its_room_is_flown(yaw):
+    """The last digit of the sine must not count."""
+    flight = hovering()
+    corner = np.array([5.0, 5.0, 0.6, 0.0, 0.0, yaw, 0.0, math.pi / 2])
+    accepted, text = flight.mission.plan(pose("s500_arm", *hand("s500_arm", corner)[:4]))
+    assert accepted, text
+
+
 def test_another_goal_of_the_base_replaces_the_hand_and_keeps_the_arm():
     flight = hovering()
     assert flight.mission.plan(pose("s500_arm", 0.5, 0.2, 0.3))[0]

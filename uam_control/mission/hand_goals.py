@@ -35,7 +35,7 @@ UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
 FAR = 100.0  # [m] from the base's room: no arm is as long
-INSIDE = 1e-6  # [m] of the base's room: the goal is not refused for its last digit
+INSIDE = 1e-6  # [m] beyond the base's room: no goal is refused for its last digit
 # A jog stops in SHARE of the way at full speed, BENT of length^2 times its acceleration, and
 # STEEPEST times the mean one: the quintic that ends without jerk, so gently.
 SHARE, BENT, STEEPEST = 0.4, 0.05, 16 / 9
@@ -237,7 +237,7 @@ def _met(
             f"singular: the tool's y axis leans by {math.degrees(upright):.0f} deg, the heading is "
             f"lost from {math.degrees(UPRIGHT):.0f} deg on"
         )
-    space = room(p, ground) + [[INSIDE], [-INSIDE]]
+    space = room(p, ground)
     places = wanted[:, POSITION]
     if not np.abs(places - np.clip(places, *space)).max() <= FAR:
         raise PlanRefused(
@@ -245,6 +245,7 @@ def _met(
         )
     found = placed(flyer.chain, wanted, reference[CHI, ARM], joint_room(p), space)
     _check_reach(found, space)
+    found.chi[:, POSITION] = np.clip(found.chi[:, POSITION], *space)
     return found.chi
 
 

@@ -105,6 +105,7 @@ class Charts:
         there is an end effector."""
         self._gui, self._window, self._interval = gui, window, interval
         self._joints = len(joints)
+        self._charts: list[StripChart] = []
         self._adaptation: dict[Topic, StripChart] = {}
         with panel.add_tab("Errors", viser.Icon.CHART_LINE):
             self._position = self._chart("Position error [cm]", XYZ)
@@ -121,7 +122,8 @@ class Charts:
 
     def _chart(self, title: str, names: Sequence[str], logarithmic: bool = False) -> StripChart:
         chart = Chart(title, tuple(names), logarithmic)
-        return StripChart(self._gui, chart, self._window, self._interval)
+        self._charts.append(StripChart(self._gui, chart, self._window, self._interval))
+        return self._charts[-1]
 
     def show(self, topic: Topic, message: Any) -> None:
         """Store the data of a message if its topic is plotted."""
@@ -156,17 +158,7 @@ class Charts:
 
     def draw(self) -> None:
         """Send new data to the page."""
-        fixed = (
-            self._position,
-            self._attitude,
-            self._arm,
-            self._force,
-            self._torque,
-            self._effort,
-            self._thrust,
-            self._rates,
-        )
-        for chart in (*fixed, *self._adaptation.values()):
+        for chart in self._charts:
             chart.draw()
 
 
