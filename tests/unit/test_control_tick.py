@@ -9,7 +9,9 @@ import pytest
 from control_rig import PERIOD, Rig
 
 from uam_control.coordinates import ARM
+from uam_control.maths.kept_tuple import bound
 from uam_control.stages.control_tick import STAGES
+from uam_control.stages.step import DONE
 
 
 def test_the_stages_are_those_of_the_block_diagram():
@@ -39,6 +41,25 @@ def test_a_law_of_the_whole_body_is_one_stage():
         assert law.controller.adaptation.any(), "the rates stay, against what is predicted"
     desired = rig.control.position.controller.attitude_reference
     np.testing.assert_array_equal(signals.attitude_reference, desired)
+
+
+def test_the_compiled_step_of_the_whole_body_does_what_the_stage_does():
+    outputs = []
+    for compiled in (False, True):
+        rig = Rig("whole_body_l1")
+        rig.run(3.0)
+        control = rig.control
+        stage = next(one for one in control.stages if one.name == "whole body")
+        if compiled:
+            step = stage.step(control)
+            assert bound(step.function, step.arrays)() == DONE
+        else:
+            assert stage.run(control)
+        s, laws = control.signals, control.laws.values()
+        gains = [one.controller.law.adaptation.copy() for one in laws]
+        outputs.append([s.tau_p, s.tau_q, s.tau_alpha, s.attitude_reference, *gains])
+    for by_python, by_step in zip(*outputs, strict=True):
+        np.testing.assert_array_equal(by_python, by_step)
 
 
 def test_a_further_stage_comes_before_the_one_named():

@@ -16,6 +16,7 @@ from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
 from uam_control.settings.parameter_file import ProfileError
 from uam_control.vehicle import load_description
+from uam_lab.experiments.margins.kept import judged
 
 DT, G = 0.004, 9.81
 VEHICLE = load_description("t650")
@@ -178,3 +179,27 @@ def test_one_law_for_some_of_the_controllers_is_refused():
     )
     with pytest.raises(ProfileError, match=text):
         profile_of(mixed, Path("own.yaml"), VEHICLE)
+
+
+def test_the_profile_has_the_published_gains():
+    """k_x 50.03, k_v 12.58; k_R 2.134, k_w 1.567 over M_rd; K_y 211.9, 0.2484 and D_y 26.82,
+    0.2903 over M_y 1, 0.05."""
+    position, attitude, arm = (
+        SETS[f"{name}_controller"] for name in ("position", "attitude", "arm")
+    )
+    turning = np.array([0.145617, 0.139992, 0.143795])
+    np.testing.assert_allclose(3.746174 * np.array(position.lambda_1), 50.03, rtol=1e-4)
+    np.testing.assert_allclose(3.746174 * np.array(position.lambda_2), 12.58, rtol=1e-4)
+    np.testing.assert_allclose(turning * attitude.lambda_1, 2.134, rtol=1e-4)
+    np.testing.assert_allclose(turning * attitude.lambda_2, 1.567, rtol=1e-4)
+    np.testing.assert_allclose(
+        np.array(arm.task_lambda_1) * [1, 1, 1, 0.05], [211.9] * 3 + [0.2484]
+    )
+    np.testing.assert_allclose(
+        np.array(arm.task_lambda_2) * [1, 1, 1, 0.05], [26.82] * 3 + [0.2903]
+    )
+
+
+def test_margins_are_not_those_of_three_laws_by_themselves():
+    profile = default_profile("whole_body_l1")
+    assert profile.whole and not judged(profile) and judged(default_profile("geometric"))

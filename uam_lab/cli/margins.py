@@ -77,6 +77,8 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError(f"--arm: {len(options.arm)} angles, the vehicle has {joints} joints")
     if profile.section("mavlink_bridge").get("setpoint", "rates") != "rates":
         raise SettingsError(f"{profile.name}: margins need body-rate setpoints, setpoint: rates")
+    if profile.whole:
+        raise SettingsError(f"{profile.name}: margins need a law of each subsystem, not of all")
     payloads = options.payload or [0.0, 0.2]
     series = series_of(options.flight) if options.flight and not options.initial else None
     out = make_folder(options.out, "margins")  # before the flight, which takes long

@@ -20,9 +20,10 @@ LEAST_GAIN, MOST_PEAK = 3.0, 4.0  # [dB]; largest sensitivity
 
 
 def judged(profile: Profile) -> bool:
-    """Return whether the model has the profile's setpoints: body rates, and torques of joints."""
+    """Return whether the model has the profile's laws, each by itself, and its setpoints: body
+    rates, and torques of joints."""
     rates = profile.section(BRIDGE).get("setpoint", "rates") == "rates"
-    return rates and profile.sets["arm_controller"].setpoint == CURRENT_SERVO
+    return rates and not profile.whole and profile.sets["arm_controller"].setpoint == CURRENT_SERVO
 
 
 def missed(profile: Profile, payloads: Sequence[float]) -> tuple[str, ...]:
