@@ -27,6 +27,19 @@ def test_one_process_has_the_control_nodes():
     assert fused.layout != separate.layout
 
 
+def test_a_law_of_the_whole_body_has_one_process_for_its_controllers():
+    whole = settings(controller="whole_body_l1")
+    found = node_arguments.modules(whole)
+    assert found[wiring.WHOLE_BODY] == "uam_control.nodes.whole_body_controller"
+    inside = (wiring.POSITION, wiring.ATTITUDE, wiring.ARM)
+    assert not set(inside) & found.keys()
+    assert node_arguments.nodes_in(wiring.WHOLE_BODY, whole) == inside
+    fused = node_arguments.modules(settings(controller="whole_body_l1", fused=True))
+    assert wiring.WHOLE_BODY not in fused and wiring.FLIGHT_CONTROLLER in fused
+    with pytest.raises(SettingsError, match="without arm_controller: whole_body_l1 is one law"):
+        settings(controller="whole_body_l1", without=["arm_controller"])
+
+
 def test_nodes_of_the_user_are_left_out_of_the_process():
     fused = settings(fused=True, without=["arm_controller"])
     inside = node_arguments.nodes_in(wiring.FLIGHT_CONTROLLER, fused)
