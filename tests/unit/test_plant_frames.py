@@ -60,8 +60,8 @@ def test_a_joint_turns_about_its_axis_after_the_frame():
     _, link, hand = frames(MODEL)
     # (.6, 0, .8, 0) is a turn of 2 atan(.8/.6) about y; a quarter turn more by (h, 0, h, 0)
     expected = [(0.6 - 0.8) * HALF, 0.0, (0.6 + 0.8) * HALF, 0.0]
-    np.testing.assert_allclose(link.turned(math.pi / 2.0), expected, atol=1e-15)
-    np.testing.assert_allclose(hand.turned(-math.pi / 2.0), [HALF, -HALF, 0.0, 0.0])
+    np.testing.assert_allclose(link.moved(math.pi / 2.0)[1], expected, atol=1e-15)
+    np.testing.assert_allclose(hand.moved(-math.pi / 2.0)[1], [HALF, -HALF, 0.0, 0.0])
 
 
 def test_a_box_has_edges_of_twice_its_half_sizes():

@@ -27,7 +27,7 @@ def test_blocks_lay_out_a_state_row_by_row():
     assert series["truth.alpha_2"][0] == 7.0
     assert series["truth.x_dot"][0] == 8.0
     assert series["truth.alpha_2_ddot"][0] == 23.0
-    assert series.block("adaptation.arm.").shape == (1, 30)  # the gains of all laws
+    assert series.block("adaptation.arm.").shape == (1, 36)  # the gains of all laws
 
 
 def test_a_prefix_without_adjacent_columns_is_refused():
