@@ -11,6 +11,7 @@ from uam_control.arm.chain import as_parameters
 from uam_control.arm.dynamics import gravity_torque
 from uam_control.arm.floating import decoupled, stiff, write_task
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.control.thrust_direction import write_thrust_attitude
 from uam_control.control.whole_body import WholeBody
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
@@ -203,3 +204,23 @@ def test_the_profile_has_the_published_gains():
 def test_margins_are_not_those_of_three_laws_by_themselves():
     profile = default_profile("whole_body_l1")
     assert profile.whole and not judged(profile) and judged(default_profile("geometric"))
+
+
+def test_the_attitude_of_a_turning_thrust_has_its_rates():
+    """z along f = (2 sin t, cos 2t, 30 + sin t), x as near to the heading 0.3 t + 0.1 t^2."""
+
+    def attitude(t):
+        force = (2.0 * np.sin(t), np.cos(2.0 * t), 30.0 + np.sin(t))
+        change = (2.0 * np.cos(t), -2.0 * np.sin(2.0 * t), np.cos(t))
+        bend = (-2.0 * np.sin(t), -4.0 * np.cos(2.0 * t), -np.sin(t))
+        value, heading = np.zeros((3, 3)), np.array([0.3 * t + 0.1 * t**2, 0.3 + 0.2 * t, 0.2])
+        write_thrust_attitude(force, change, bend, heading, value)
+        return value, matrix_from_euler(value[0]), np.array(force)
+
+    step = 1e-5
+    (value, turn, force), before, after = attitude(0.7), attitude(0.7 - step), attitude(0.7 + step)
+    np.testing.assert_allclose(turn[:, 2], force / np.linalg.norm(force), atol=1e-12)
+    assert turn[:, 1] @ [np.cos(0.259), np.sin(0.259), 0.0] == pytest.approx(0.0, abs=1e-12)
+    spin = turn.T @ (after[1] - before[1]) / (2.0 * step)
+    np.testing.assert_allclose(value[1], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
+    np.testing.assert_allclose(value[2], (after[0][1] - before[0][1]) / (2.0 * step), atol=1e-8)
