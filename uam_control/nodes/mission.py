@@ -98,7 +98,7 @@ class MissionNode(UamNode):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
         profile = default_profile(DEFAULT, vehicle)
-        derived = derived_parameters(vehicle)[NAME] | self._reference_limits(profile)
+        derived = derived_parameters(vehicle)[NAME] | self._reference_limits(profile, vehicle)
         axes = vehicle.coordinates[ARM]
         self.parameter_set = NodeParameters(
             self, MissionParameters, axes, profile.section(NAME), derived
@@ -148,13 +148,14 @@ class MissionNode(UamNode):
             self, self._mission, vehicle.joint_names, self._flyer, self._publish_answer
         )
 
-    def _reference_limits(self, profile: Profile) -> dict[str, float]:
+    def _reference_limits(self, profile: Profile, vehicle: VehicleDescription) -> dict[str, float]:
         """Return those by position controller and bridge: of the parameter file, or `profile`."""
         bases = []
         for controller, (limits, _) in list(CONTROLLERS.items())[:2]:
             given = neighbour_section(self, controller)
-            known = {name: given[name] for name in (*limits.specs(), *OF_LAWS) if name in given}
-            bases.append(replace(profile.sets[controller], **known).validated(AXES))
+            own = default_profile(given.get("law", DEFAULT), vehicle).sets[controller]
+            names = set(own.specs()) & {*limits.specs(), *OF_LAWS} & set(given)
+            bases.append(replace(own, **{name: given[name] for name in names}).validated(AXES))
         bridge = neighbour_section(self, BRIDGE) or profile.section(BRIDGE)
         return reference_limits(*bases, bridge)
 
