@@ -26,9 +26,8 @@ import numpy as np
 from uam_control.arm.hand import HEADING, reach, tools
 from uam_control.coordinates import ARM, CHI, POSITION, YAW, Z
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.hand_goals import HandPose, HandTwist, joint_room
+from uam_control.mission.hand_goals import HandPose, HandTwist, base_room, joint_room
 from uam_control.mission.motion.flyer import Flyer
-from uam_control.mission.plan_limits import room
 from uam_control.supervision import State
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.flight_settings import settings
@@ -122,7 +121,7 @@ class Hovering:
 def inside(flight: Hovering, rng: np.random.Generator, heading_only: bool) -> np.ndarray:
     """Return TOOL (6,) of a pose that the vehicle can have."""
     low, high = joint_room(flight.limits)
-    corners = room(flight.limits, flight.ground)
+    corners = base_room(flight.limits, flight.ground)
     chi = flight.reference_of_base.copy()
     chi[POSITION] = np.clip(chi[POSITION] + rng.uniform(-REACH, REACH, 3), *corners)
     chi[YAW], chi[ARM] = rng.uniform(-math.pi, math.pi), rng.uniform(low, high)
@@ -136,7 +135,7 @@ def outside(flight: Hovering, rng: np.random.Generator) -> tuple[np.ndarray, str
     """Return a pose that no vehicle can have, and the reason."""
     wanted = inside(flight, rng, True)
     kind, far = rng.integers(4), reach(flight.flyer.chain) + rng.uniform(0.5, 3.0)
-    corners = room(flight.limits, flight.ground)
+    corners = base_room(flight.limits, flight.ground)
     if kind == 0:
         wanted[Z] = flight.limits.hand_floor - rng.uniform(0.01, 2.0)
     elif kind == 1:

@@ -34,6 +34,8 @@ from uam_control.mission.plans import (
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
+# [m] of the base's room, lowest and highest x y z: at its ends, too, but not at its floor
+KEPT = np.array([[0.05, 0.05, 0.0], [-0.05, -0.05, -0.05]])
 FAR = 100.0  # [m] from the base's room: no arm is as long
 INSIDE = 1e-6  # [m] beyond the base's room: no goal is refused for its last digit
 # A jog stops in SHARE of the way at full speed, BENT of length^2 times its acceleration, and
@@ -237,7 +239,7 @@ def _met(
             f"singular: the tool's y axis leans by {math.degrees(upright):.0f} deg, the heading is "
             f"lost from {math.degrees(UPRIGHT):.0f} deg on"
         )
-    space = room(p, ground)
+    space = base_room(p, ground)
     places = wanted[:, POSITION]
     if not np.abs(places - np.clip(places, *space)).max() <= FAR:
         raise PlanRefused(
@@ -247,6 +249,11 @@ def _met(
     _check_reach(found, space)
     found.chi[:, POSITION] = np.clip(found.chi[:, POSITION], *space)
     return found.chi
+
+
+def base_room(p: MissionParameters, ground: float) -> np.ndarray:
+    """Return the corners (2, 3) [m] of the base's room for a goal; ground [m]: see `room`."""
+    return room(p, ground) + KEPT
 
 
 def joint_room(p: MissionParameters) -> np.ndarray:
