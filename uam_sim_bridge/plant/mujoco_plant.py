@@ -116,7 +116,6 @@ class MujocoPlant(Plant):
         payload_q = joint(PAYLOAD).qposadr[0]
         self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
-        self._payload_quaternion = self._payload_pose[3:7]
         plate = self.model.geom("payload_plate")
         self._payload_top = float(plate.pos[2] + plate.size[2])
         sensed = self.model.sensor("specific_force").adr[0]
