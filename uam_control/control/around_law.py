@@ -25,8 +25,8 @@ from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
-from uam_control.laws.law import LawArrays
-from uam_control.maths.compiled import borrowing
+from uam_control.laws.law import LawArrays, LawInputs
+from uam_control.maths.compiled import borrowing, inlined
 
 # saturated: whether a limit changed the output of the last tick; flying: whether the law has begun;
 # printed: form of the errors' rates; frozen: see `Law`; time [s]: counted for the goals of servos
@@ -113,6 +113,13 @@ def begin_law(
     """Write the errors of a law: see `tracking_errors`."""
     printed = a.numbers[0].printed != 0
     tracking_errors(state, reference, attitude_reference, flying, printed, a.errors, a.norms)
+
+
+@inlined
+def given(a: ControllerArrays, dt: float) -> LawInputs:
+    """Return what the law gets after a step of dt [s]."""
+    m = a.numbers[0]
+    return LawInputs(*a.own, a.norms, m.saturated != 0, m.frozen != 0, dt)
 
 
 @borrowing

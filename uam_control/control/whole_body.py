@@ -30,10 +30,10 @@ from uam_control.control.arm_load import friction
 from uam_control.control.around_law import (
     ArmArrays,
     AttitudeArrays,
-    ControllerArrays,
     PositionArrays,
     begin_law,
     command_goals,
+    given,
 )
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.output_limits import complete_and_limit, limit_torque
@@ -41,7 +41,6 @@ from uam_control.control.thrust_direction import write_thrust_attitude
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.laws.geometric import feed_back
-from uam_control.laws.law import LawInputs
 from uam_control.laws.whole_body import observe
 from uam_control.maths.compiled import jit
 from uam_control.maths.kept_tuple import bound
@@ -137,12 +136,6 @@ def _planned(reference: np.ndarray) -> np.ndarray:
 
 
 @jit
-def _given(a: ControllerArrays, dt: float) -> LawInputs:
-    m = a.numbers[0]
-    return LawInputs(*a.own, a.norms, m.saturated != 0, m.frozen != 0, dt)
-
-
-@jit
 def _observe(
     a: WholeBodyArrays, d: Decoupled, velocity: Vector, state: np.ndarray, dt: float
 ) -> None:
@@ -207,7 +200,7 @@ def _force(
         of.own[E][i] = now[0][i] - plan[0][i]
         of.own[E_DOT][i] = now[1][i] - plan[1][i]
         of.own[FEEDFORWARD][i] = plan[2][i]
-    feed_back(law.record[0], _given(of, dt), law.tau)
+    feed_back(law.record[0], given(of, dt), law.tau)
     for i in range(3):
         law.tau[i] -= law.adaptation[i]
     m.saturated = complete_and_limit(
@@ -260,7 +253,7 @@ def _turning(
     """Return M_r (Omega_c_dot - lambda_1 e_R - lambda_2 e_Omega) - d_r (3,) [N m]."""
     of = a.attitude.all
     begin_law(of, state, wanted, a.position.attitude, True)
-    feed_back(of.law.record[0], _given(of, dt), of.law.tau)
+    feed_back(of.law.record[0], given(of, dt), of.law.tau)
     return d.turning @ (of.law.tau / a.attitude.inertia) - of.law.adaptation[:3]
 
 
@@ -305,7 +298,7 @@ def _arm(
     internal = of.law.adaptation[count : 2 * count].copy()
     net = pull.T @ np.linalg.solve(damped, inertia @ lack - pull @ internal)
     if count > TASK:
-        feed_back(p, _given(of, 0.0), of.law.tau)
+        feed_back(p, given(of, 0.0), of.law.tau)
         posture = d.joints @ (of.law.tau / a.arm.inertia)
         net += posture - pull.T @ np.linalg.solve(damped, pull @ posture)
     return net

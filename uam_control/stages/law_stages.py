@@ -9,18 +9,17 @@ from functools import cache
 import numpy as np
 
 from uam_control.control.around_law import (
-    ControllerArrays,
     begin_attitude,
     begin_law,
     end_arm,
     end_attitude,
     end_position,
+    given,
     predict_by,
 )
 from uam_control.control.controllers import AttitudeController, Controller
 from uam_control.control.whole_body import WholeBody, WholeBodyArrays
-from uam_control.laws.law import LawInputs
-from uam_control.maths.compiled import borrowing, inlined, prepared
+from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Flag, put, record
 from uam_control.stages.step import DECIDE, DONE
 from uam_control.stages.supervisor_inputs import GAINS, StageArrays, keep
@@ -246,13 +245,6 @@ def whole_body_step(law: Callable) -> Callable[[tuple], int]:
         return DONE
 
     return control
-
-
-@inlined
-def given(a: ControllerArrays, dt: float) -> LawInputs:
-    """Return what the law gets after a step of dt [s]."""
-    m = a.numbers[0]
-    return LawInputs(*a.own, a.norms, m.saturated != 0, m.frozen != 0, dt)
 
 
 @borrowing
