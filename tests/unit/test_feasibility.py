@@ -92,6 +92,19 @@ def test_a_constant_acceleration_tilts_by_its_ratio_to_gravity():
     np.testing.assert_allclose(demand.thrust, 2.4 * 9.81 * math.sqrt(2.0))
 
 
+@pytest.mark.parametrize(("degrees", "beyond"), [(74.0, 0), (80.0, 1), (-80.0, 1)])
+def test_a_magnet_hangs_on_a_hinge_that_turns_by_150_deg(degrees, beyond):
+    """Both links by 74 deg turn it by 148, by 80 deg by 160."""
+    angle = math.radians(degrees), 0.0, 0.0
+    motion = Motion(lambda t: rows(alpha_1=angle, alpha_2=angle))
+    demand = checked().along(motion, TIMES, np.zeros(len(TIMES)))
+    found = [one for one in checked().exceeded(demand, 0.0) if "hinge" in one.quantity]
+    assert len(found) == beyond
+    for one in found:
+        assert one.value == pytest.approx(-2 * angle[0])
+        assert one.limit == pytest.approx(-math.copysign(math.radians(150.0), degrees))
+
+
 def test_drag_counts():
     motion = Motion(lambda t: rows(y=(0.0, 10.0, 0.0)))
     demand = checked().along(motion, TIMES, np.zeros(len(TIMES)))

@@ -13,8 +13,8 @@ from followed_reference import Flight, limits
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from uam_control.arm.hand import tools
-from uam_control.arm.placing import placed, turning
+from uam_control.arm.hand import hinge_angles, tools
+from uam_control.arm.placing import Room, placed, turning
 from uam_control.coordinates import ARM, CHI, CHI_DOT, YAW
 from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist, base_room, joint_room
 from uam_control.mission.motion.flyer import Flyer, flattened
@@ -32,6 +32,10 @@ ROOM = np.array([[-5.0, -5.0, 0.6], [5.0, 5.0, 5.0]])
 
 def ranges(name):
     return np.array([(one.low, one.high) for one in VEHICLES[name].joints]).T
+
+
+def room(name):
+    return Room(ROOM, ranges(name), np.array(FLYERS[name].hinge))
 
 
 def hovering(name="s500_arm", **parameters):
@@ -65,20 +69,52 @@ def test_every_pose_that_a_vehicle_can_have_is_found(name, shares):
     chi[ARM] = low + np.array(shares[4 : 4 + len(low)]) * (high - low)
     wanted = tools(FLYERS[name].chain, chi[None])
     stowed = np.array(VEHICLES[name].stowed)
-    found = placed(FLYERS[name].chain, wanted, stowed, ranges(name), ROOM)
+    found = placed(FLYERS[name].chain, wanted, stowed, room(name))
     apart = tools(FLYERS[name].chain, found.chi) - wanted
     np.testing.assert_allclose(apart[0, :3], 0.0, atol=1e-6)
     np.testing.assert_allclose(np.cos(apart[0, 3:]), 1.0, atol=1e-9)
     assert not np.abs(found.off).max() > 1e-6
     assert (found.chi[0, :3] >= ROOM[0] - 1e-6).all() and (found.chi[0, :3] <= ROOM[1] + 1e-6).all()
     assert (found.chi[0, ARM] >= low).all() and (found.chi[0, ARM] <= high).all()
+    hinge = hinge_angles(FLYERS[name].chain, found.chi[:, ARM])
+    assert FLYERS[name].hinge[0] - 1e-6 <= hinge[0] <= FLYERS[name].hinge[1] + 1e-6
+
+
+def test_a_hinge_is_counted_on_over_half_a_turn_by_hand():
+    """It turns back by what the three joints turn together; that of the t650's hand does not."""
+    arms = [0.0, 90.0, 0.0], [45.8, 107.1, 25.2], [90.0, 100.0, 30.0], [-110.0, -90.0, 0.0]
+    found = hinge_angles(FLYERS["s500_arm3"].chain, np.radians(arms))
+    np.testing.assert_allclose(np.degrees(found), [-90.0, -178.1, -220.0, 200.0], atol=1e-9)
+    assert not hinge_angles(FLYERS["t650"].chain, np.ones((1, 4))).any()
+
+
+def test_no_arm_is_raised_so_far_that_the_magnet_lies_on_the_end_of_its_hinge():
+    """The hinge of the S-500's magnet turns by 150 deg, and 0.1 rad are kept for the base's tilt.
+
+    The hand is to be 12 mm above the base. Joints of 45.8, 107.1 and 25.2 deg would do; they make
+    178 deg, and the magnet hung 28 deg askew.
+    """
+    name, posture = "s500_arm3", np.radians([45.8, 107.1, 25.2])
+    low, high = np.degrees(FLYERS[name].hinge)
+    np.testing.assert_allclose([low, high], [-150.0, 150.0])
+    chi = np.zeros((1, 9))
+    chi[0, ARM] = posture
+    high_up = tools(FLYERS[name].chain, chi)
+    high_up[:, 3:] = 0.0, FREE, FREE
+    space = np.array([[-1.0, -1.0, -0.3], [1.0, 1.0, 0.0]])
+    ends = np.radians([-150.0, 150.0]) + (0.1, -0.1)
+    found = placed(FLYERS[name].chain, high_up, posture, Room(space, ranges(name), ends))
+    assert np.degrees(found.chi[0, ARM]).sum() <= 150.0 - 5.72
+    np.testing.assert_allclose(
+        tools(FLYERS[name].chain, found.chi)[0, :4], high_up[0, :4], atol=1e-6
+    )
 
 
 def test_the_base_does_what_it_can_alone_by_hand():
     """The S-500's magnet hangs 0.14 m ahead and 0.203 m below when it is stowed."""
     wanted = np.array([[1.0, 2.0, 0.9, math.pi / 2, FREE, FREE]])
     stowed = np.array([0.0, math.pi / 2])
-    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, ranges("s500_arm"), ROOM)
+    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, room("s500_arm"))
     expected = [1.0, 2.0 - 0.14, 0.9 + 0.203, 0.0, 0.0, math.pi / 2, 0.0, math.pi / 2]
     np.testing.assert_allclose(found.chi[0], expected, atol=1e-9)
 
@@ -86,7 +122,7 @@ def test_the_base_does_what_it_can_alone_by_hand():
 def test_the_arm_reaches_down_where_the_base_may_not():
     wanted = np.array([[0.0, 0.0, 0.35, 0.0, FREE, FREE]])
     stowed = np.array([0.0, math.pi / 2])
-    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, ranges("s500_arm"), ROOM)
+    found = placed(FLYERS["s500_arm"].chain, wanted, stowed, room("s500_arm"))
     assert found.chi[0, 2] == pytest.approx(0.6) and not np.abs(found.off).max() > 1e-6
     assert abs(found.chi[0, 7]) < 1.4
 

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.kinematics import hand_jacobian, hand_pose, last_link
+from uam_control.arm.kinematics import DOWN, hand_jacobian, hand_pose, hanging, last_link
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.compiled import borrowing, jit
-from uam_control.maths.rotations import matrix_from_euler, wrap_angle
+from uam_control.maths.rotations import matrix_from_euler, wrap_angle, wrapped
 from uam_control.maths.vectors import (
     Rows,
     Vector,
@@ -26,6 +26,7 @@ from uam_control.maths.vectors import (
     product,
     rows,
     times,
+    transposed,
     turned,
     vector,
 )
@@ -112,6 +113,28 @@ def tools(chain: Chain, chi: np.ndarray, swing: np.ndarray | None = None) -> np.
     if swing is None or not np.any(chain.swing_axis):
         swing = np.full(len(chi), np.nan)
     _write_tools(chain, np.ascontiguousarray(chi), np.ascontiguousarray(swing), found)
+    return found
+
+
+@jit
+def hinge_angles(chain: Chain, angles: np.ndarray) -> np.ndarray:
+    """Return where the hinge stands (m,) [rad] on which a hand hangs, of a level base.
+
+    angles (m, n) [rad]. Counted from the arm at zero on without a jump: an arm that turns over in
+    one direction takes a hinge over its end, not past it. 0 for a hand that does not hang.
+    """
+    found, axis = np.zeros(len(angles)), vector(chain.swing_axis)
+    if dot(axis, axis) == 0.0:
+        return found
+    for i in range(len(angles)):
+        last = last_link(chain, angles[i])[1]
+        turn = product(transposed(last), hanging(chain, last, DOWN))
+        twist = (turn[2][1] - turn[1][2], turn[0][2] - turn[2][0], turn[1][0] - turn[0][1])
+        found[i] = math.atan2(dot(axis, twist), turn[0][0] + turn[1][1] + turn[2][2] - 1.0)
+        rolled = 0.0
+        for k in range(angles.shape[1]):
+            rolled -= angles[i, k] * dot(axis, vector(chain.axes[k]))
+        found[i] = rolled + wrapped(found[i] - rolled)
     return found
 
 

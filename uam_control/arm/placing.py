@@ -1,7 +1,8 @@
 """Base and arm for a place of the end effector: the base level, the arm near a posture.
 
 The base does the place and the heading, so the arm keeps its posture. It leaves it, by the least
-change, where the base would leave its room, and for elevation and lean of the tool.
+change, where the base would leave its room, for elevation and lean of the tool, and for the hinge
+of a hand that hangs.
 """
 
 from __future__ import annotations
@@ -11,11 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.hand import ELEVATION, HEADING, LEAN, STEP, jacobians, least_change, tools
+from uam_control.arm.hand import (
+    ELEVATION,
+    HEADING,
+    LEAN,
+    STEP,
+    hinge_angles,
+    jacobians,
+    least_change,
+    tools,
+)
 from uam_control.coordinates import ALPHA, ARM, POSITION, YAW
 from uam_control.maths.rotations import wrap_angle
 
-BEYOND, TURNED = slice(0, 3), slice(3, 5)  # columns of what is off: [m], [rad]
+BEYOND, TURNED, HINGE = slice(0, 3), slice(3, 5), 5  # columns of what is off: [m], [rad]
 TILTS = [ELEVATION, LEAN]  # of TOOL
 CLOSE = 1e-8  # [m, rad] at which the search ends
 ROUNDS = 30
@@ -23,29 +33,38 @@ LONGEST = 0.5  # [rad] of one step of a joint
 STARTS = 6  # further postures, from which one is sought
 
 
+class Room(NamedTuple):
+    """base (2, 3) [m], joints (2, n) [rad], hinge (2,) [rad] of the hand: lowest, highest."""
+
+    base: np.ndarray
+    joints: np.ndarray
+    hinge: np.ndarray
+
+
 class Placed(NamedTuple):
-    """chi (m, 6 + n) of level bases; off (m, 5): BEYOND, of the base from its room, and TURNED, of
-    the tool's elevation and lean from those wanted; zeros where all is met."""
+    """chi (m, 6 + n) of level bases; off (m, 6): BEYOND, of the base from its room, TURNED, of the
+    tool's elevation and lean from those wanted, HINGE, of the hand's hinge from its range; zeros
+    where all is met."""
 
     chi: np.ndarray
     off: np.ndarray
 
 
-def placed(
-    chain: Chain, wanted: np.ndarray, posture: np.ndarray, ranges: np.ndarray, room: np.ndarray
-) -> Placed:
+def placed(chain: Chain, wanted: np.ndarray, posture: np.ndarray, room: Room) -> Placed:
     """Return base and arm for tools at `wanted` (m, 6), columns TOOL; NaN: any elevation, lean.
 
-    posture (n,) [rad]; ranges (2, n) [rad] of the joints; room (2, 3) [m] of the base. One that is
-    not met from the posture on is sought from others, for a single tool.
+    posture (n,) [rad]. One that is not met from the posture on is sought from others, for a single
+    tool.
     """
     count = len(posture)
-    found = _approached(chain, wanted, np.tile(posture, (len(wanted), 1)), ranges, room)
+    found = _approached(chain, wanted, np.tile(posture, (len(wanted), 1)), room)
     if len(wanted) > 1 or not np.any(np.abs(found.off) > CLOSE) or not count:
         return found
     shares = np.random.default_rng(0).uniform(size=(STARTS, count))
-    starts = ranges[0] + shares * (ranges[1] - ranges[0])
-    others = _approached(chain, np.repeat(wanted, STARTS, axis=0), starts, ranges, room)
+    low, high = room.joints
+    others = _approached(
+        chain, np.repeat(wanted, STARTS, axis=0), low + shares * (high - low), room
+    )
     off = np.linalg.norm(others.off, axis=1)
     away = np.linalg.norm(others.chi[:, ARM] - posture, axis=1)
     best = np.lexsort((away, np.where(off > CLOSE, off, 0.0)))[0]
@@ -73,11 +92,10 @@ def turning(chain: Chain, chi: np.ndarray, rates: np.ndarray) -> tuple[np.ndarra
     return found, rates[TILTS] - swung[TILTS]
 
 
-def _approached(
-    chain: Chain, wanted: np.ndarray, starts: np.ndarray, ranges: np.ndarray, room: np.ndarray
-) -> Placed:
+def _approached(chain: Chain, wanted: np.ndarray, starts: np.ndarray, room: Room) -> Placed:
     """Return what is found from arms at `starts` (m, n) [rad] on, by least changes."""
-    angles, (rows, joints) = np.clip(starts, *ranges), starts.shape
+    low, high = room.joints
+    angles, (rows, joints) = np.clip(starts, low, high), starts.shape
     steps = STEP * np.vstack([np.zeros(joints), np.eye(joints)])
     for _ in range(ROUNDS):
         moved = (angles[:, None] + steps).reshape(-1, joints)
@@ -88,10 +106,10 @@ def _approached(
             break
         slopes = ((off[:, 1:] - off[:, :1]) / STEP).swapaxes(1, 2)
         step = least_change(slopes, -off[:, 0])
-        ends = ((step < 0.0) & (angles <= ranges[0])) | ((step > 0.0) & (angles >= ranges[1]))
+        ends = ((step < 0.0) & (angles <= low)) | ((step > 0.0) & (angles >= high))
         step = least_change(np.where(ends[:, None], 0.0, slopes), -off[:, 0])
         longest = np.abs(step).max(axis=1, initial=LONGEST, keepdims=True)
-        angles = np.clip(angles + step * LONGEST / longest, *ranges)
+        angles = np.clip(angles + step * LONGEST / longest, low, high)
     chi = _based(chain, wanted, angles)
     return Placed(chi, _off(chain, wanted, chi, room))
 
@@ -105,9 +123,11 @@ def _based(chain: Chain, wanted: np.ndarray, angles: np.ndarray) -> np.ndarray:
     return chi
 
 
-def _off(chain: Chain, wanted: np.ndarray, chi: np.ndarray, room: np.ndarray) -> np.ndarray:
-    """Return what is off (m, 5), see `Placed`."""
-    off = np.zeros((len(chi), 5))
-    off[:, BEYOND] = chi[:, POSITION] - np.clip(chi[:, POSITION], *room)
+def _off(chain: Chain, wanted: np.ndarray, chi: np.ndarray, room: Room) -> np.ndarray:
+    """Return what is off (m, 6), see `Placed`."""
+    off = np.zeros((len(chi), HINGE + 1))
+    off[:, BEYOND] = chi[:, POSITION] - np.clip(chi[:, POSITION], *room.base)
+    hinge = hinge_angles(chain, np.ascontiguousarray(chi[:, ARM]))
+    off[:, HINGE] = hinge - np.clip(hinge, *room.hinge)
     off[:, TURNED] = np.nan_to_num(wrap_angle(tools(chain, chi)[:, TILTS] - wanted[:, TILTS]))
     return off

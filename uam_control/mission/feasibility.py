@@ -15,6 +15,7 @@ from operator import attrgetter
 import numpy as np
 
 from uam_control.arm.chain import Chain, carrying
+from uam_control.arm.hand import hinge_angles
 from uam_control.arm.dynamics import inverse_dynamics
 from uam_control.coordinates import (
     ALPHA,
@@ -42,7 +43,7 @@ from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
 from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
-from uam_control.vehicle import NO_GRIPPER, VehicleDescription, VehicleError, chain_of
+from uam_control.vehicle import NO_GRIPPER, VehicleDescription, VehicleError, chain_and_hinge
 
 STEP = 0.01  # [s] between two checks
 PART = 60000  # checks in one part of a long flight
@@ -160,6 +161,10 @@ class Feasibility:
         place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
+        if self._chain is not None:
+            lowest, highest = np.column_stack([p.joint_ranges, self._hinge])
+            hinge = hinge_angles(self._chain, np.ascontiguousarray(demand.angles))
+            angles.append(("angle of the hand's hinge", hinge))
         upper += [(*angle, highest[i], "rad") for i, angle in enumerate(angles)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
@@ -368,13 +373,22 @@ class Feasibility:
             torques[at], pull[at] = loaded[at], np.linalg.norm(more - push, axis=1)[at]
         return torques, pull
 
-    @cached_property
+    @property
     def _chain(self) -> Chain | None:
         """The arm; None for a vehicle of another physics engine, whose model is not MuJoCo's."""
+        return self._arm_and_hinge[0]
+
+    @property
+    def _hinge(self) -> tuple[float, float]:
+        """Lowest and highest angle [rad] of the hinge that the hand hangs on, if any."""
+        return self._arm_and_hinge[1]
+
+    @cached_property
+    def _arm_and_hinge(self) -> tuple[Chain | None, tuple[float, float]]:
         try:
-            return chain_of(self.vehicle)
+            return chain_and_hinge(self.vehicle)
         except VehicleError:
-            return None
+            return None, (-math.inf, math.inf)
 
 
 def in_words(excesses: list[Excess]) -> str:

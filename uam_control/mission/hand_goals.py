@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.arm.hand import ELEVATION, HEADING, LEAN, hands, tools
-from uam_control.arm.placing import BEYOND, CLOSE, TURNED, Placed, placed, turning
+from uam_control.arm.placing import BEYOND, CLOSE, HINGE, TURNED, Placed, Room, placed, turning
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, ROLL, YAW, Z
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
@@ -34,6 +34,7 @@ from uam_control.mission.plans import (
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost
 TURNED_BY = math.radians(1.0)  # by which the tool may miss elevation and lean
 WITHIN = 0.03  # [rad] of the joints' ranges: at their ends the supervisor holds
+TILTING = 0.1  # [rad] kept from the ends of the hand's hinge: the base tilts on its way
 # [m] of the base's room, lowest and highest x y z: at its ends, too, but not at its floor
 KEPT = np.array([[0.05, 0.05, 0.0], [-0.05, -0.05, -0.05]])
 FAR = 100.0  # [m] from the base's room: no arm is as long
@@ -245,7 +246,8 @@ def _met(
         raise PlanRefused(
             f"out of reach: a place is more than {FAR:g} m outside of the base's room"
         )
-    found = placed(flyer.chain, wanted, reference[CHI, ARM], joint_room(p), space)
+    hinge = np.array(flyer.hinge) + (TILTING, -TILTING)
+    found = placed(flyer.chain, wanted, reference[CHI, ARM], Room(space, joint_room(p), hinge))
     _check_reach(found, space)
     found.chi[:, POSITION] = np.clip(found.chi[:, POSITION], *space)
     return found.chi
@@ -283,6 +285,12 @@ def _check_reach(found: Placed, space: np.ndarray) -> None:
         raise PlanRefused(
             f"out of reach: {which.format(row)}the arm leaves the tool "
             f"{math.degrees(turned[row, axis]):.0f} deg from its {('elevation', 'lean')[axis]}"
+        )
+    row = int(np.argmax(np.abs(found.off[:, HINGE])))
+    if not abs(found.off[row, HINGE]) <= INSIDE:
+        raise PlanRefused(
+            f"out of reach: {which.format(row)}the hand's hinge would be "
+            f"{abs(math.degrees(found.off[row, HINGE])):.0f} deg too near to its end"
         )
 
 

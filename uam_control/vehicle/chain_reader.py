@@ -22,9 +22,17 @@ Lump = tuple[float, np.ndarray, np.ndarray]  # mass [kg], centre (3,) [m], inert
 
 def chain_of(vehicle: VehicleDescription) -> Chain:
     """Return the arm of a vehicle. Raises VehicleError: one line with the MJCF and the reason."""
+    return chain_and_hinge(vehicle)[0]
+
+
+def chain_and_hinge(vehicle: VehicleDescription) -> tuple[Chain, tuple[float, float]]:
+    """Return the arm, and lowest and highest angle [rad] of the hinge that its hand hangs on.
+
+    Infinite for a hand without hinge, or without ends of it. Raises VehicleError, see `chain_of`.
+    """
     try:
-        model = model_spec(vehicle).compile()
-        return read_chain(model, vehicle.joint_names, vehicle.end_effector)
+        reader = _reader(model_spec(vehicle).compile(), vehicle.joint_names)
+        return reader.chain(vehicle.end_effector), reader.hinge
     except ValueError as error:
         reason = " ".join(str(error).removeprefix("Error: ").split())
         raise VehicleError(f"{vehicle.model}: {reason}") from None
@@ -37,10 +45,7 @@ def read_chain(model: mujoco.MjModel, joints: tuple[str, ...], end_effector: str
     joints that are no serial chain of 1 to 7 hinges on the body `base`, and for a site that the
     last link does not carry.
     """
-    places = (model.jnt_axis, model.jnt_pos, model.body_pos, model.body_quat, model.body_inertia)
-    if not all(np.isfinite(one).all() for one in places):
-        raise ValueError("an axis, a place or an inertia is not finite")
-    return _Reader(model, joints).chain(end_effector)
+    return _reader(model, joints).chain(end_effector)
 
 
 def hand_site(model: mujoco.MjModel, end_effector: str) -> int:
@@ -53,8 +58,20 @@ def hand_site(model: mujoco.MjModel, end_effector: str) -> int:
     return next((site for site in found if site >= 0), -1)
 
 
+def _reader(model: mujoco.MjModel, joints: tuple[str, ...]) -> _Reader:
+    places = (model.jnt_axis, model.jnt_pos, model.body_pos, model.body_quat, model.body_inertia)
+    if not all(np.isfinite(one).all() for one in places):
+        raise ValueError("an axis, a place or an inertia is not finite")
+    return _Reader(model, joints)
+
+
 class _Reader:
-    """A model with every joint at zero; all that it returns is in the base's frame."""
+    """A model with every joint at zero; all that it returns is in the base's frame.
+
+    hinge: range [rad] of the hinge that the hand hangs on, known with the chain.
+    """
+
+    hinge = -np.inf, np.inf
 
     def __init__(self, model: mujoco.MjModel, joints: tuple[str, ...]) -> None:
         import mujoco
@@ -144,6 +161,8 @@ class _Reader:
         found["hand_turn"] = self._turn @ data.site_xmat[site].reshape(3, 3)
         found |= {"has_hand": 1, "hand_place": place - last}
         if (hinge := self._hinge_of(site)) is not None:
+            if self._model.jnt_limited[hinge]:
+                self.hinge = tuple(self._model.jnt_range[hinge].tolist())
             pivot = self._inside(data.xanchor[hinge])
             mass, centre, _ = self._lump(self._owner == SWINGS)
             found |= {"hand_place": pivot - last, "swing_axis": self._turn @ data.xaxis[hinge]}

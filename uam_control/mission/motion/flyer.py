@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,24 +10,26 @@ import numpy as np
 from uam_control.arm.chain import Chain
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.mission.motion.flatness import attitudes
-from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
+from uam_control.vehicle import VehicleDescription, VehicleError, chain_and_hinge
 
 
 class Flyer(NamedTuple):
-    """gravity [m/s^2]; drag (3,): linear, per mass, along the world axes [1/s]."""
+    """gravity [m/s^2]; drag (3,): linear, per mass, along the world axes [1/s]; hinge: lowest and
+    highest angle [rad] of the one that the hand hangs on."""
 
     chain: Chain
     gravity: float
     drag: np.ndarray
+    hinge: tuple[float, float] = (-math.inf, math.inf)
 
     @classmethod
     def of(cls, vehicle: VehicleDescription) -> Flyer:
         """Return that of a vehicle. Raises VehicleError, also for one without an end effector."""
-        chain = chain_of(vehicle)
+        chain, hinge = chain_and_hinge(vehicle)
         if not chain.has_hand:
             raise VehicleError(f"{vehicle.file}: the vehicle has no end effector")
         drag = np.array(vehicle.numbers["air"]["drag"]) / vehicle.mass
-        return cls(chain, vehicle.gravity, drag)
+        return cls(chain, vehicle.gravity, drag, hinge)
 
     @classmethod
     def with_hand(cls, vehicle: VehicleDescription) -> Flyer | None:
