@@ -15,8 +15,8 @@ from operator import attrgetter
 import numpy as np
 
 from uam_control.arm.chain import Chain, carrying
-from uam_control.arm.hand import hinge_angles
 from uam_control.arm.dynamics import inverse_dynamics
+from uam_control.arm.hand import hinge_angles
 from uam_control.coordinates import (
     ALPHA,
     ARM,
