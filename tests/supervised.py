@@ -45,17 +45,27 @@ def with_state(entry, value):
     return seen
 
 
-def mermaid(transitions, first, last):
-    """Return transitions as a mermaid state diagram, one arrow per pair of states."""
+def mermaid(transitions, first, last, group):
+    """Return transitions as a mermaid state diagram, one arrow per pair of states; what leads out
+    of each state of `group` to one target leads out of the group."""
+    named = {state: state.value.replace(" ", "_") for state in type(first)}
+    shared = [
+        (event, target)
+        for source, event, target in transitions
+        if source is group[0] and all((state, event, target) in transitions for state in group)
+    ]
     arrows = {}
     for source, event, target in transitions:
-        arrows.setdefault((source, target), []).append(event.value)
-    lines = ["stateDiagram-v2"]
-    lines += [f'    state "{state.value}" as {state.name}' for state in type(first)]
-    lines.append(f"    [*] --> {first.name}")
+        together = source in group and (event, target) in shared
+        if not together or source is group[0]:
+            pair = "scenario" if together else named[source], named[target]
+            arrows.setdefault(pair, []).append(event.value)
+    lines = ["stateDiagram-v2", "    state scenario {"]
+    lines += [f"        {named[state]}" for state in group]
+    lines += ["    }", f"    [*] --> {named[first]}"]
     lines += [
-        f"    {source.name} --> {target.name}: {' / '.join(events)}"
+        f"    {source} --> {target}: {' / '.join(events)}"
         for (source, target), events in arrows.items()
     ]
-    lines.append(f"    {last.name} --> [*]")
+    lines.append(f"    {named[last]} --> [*]")
     return "\n".join(lines)

@@ -110,15 +110,27 @@ def _shown(value: float | list[float]) -> str:
 
 
 def table() -> str:
-    """Return effects, sources and usual numbers in Markdown: of docs/plant.md."""
-    lines = ["| effect | does | parameters (usual) | source |", "|---|---|---|---|"]
+    """Return effects and their sources in Markdown: of docs/plant.md."""
+    lines = ["| effect | does | source |", "|---|---|---|"]
+    lines += [
+        f"| `{name}` | {EFFECTS[name].ABOUT} | {EFFECTS[name].SOURCE} |" for name in usual_numbers()
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def listing() -> str:
+    """Return effects, parameters and usual numbers as text for a terminal."""
+    lines = []
     for name, values in usual_numbers().items():
-        kind = EFFECTS[name]
-        words = "; ".join(
-            f"`{parameter}`: {spec.description} "
+        lines.append(f"{name}: {EFFECTS[name].ABOUT}")
+        lines += [
+            f"    {parameter}: {spec.description} "
             f"({_shown(values.get(parameter, []))} {spec.unit}".removesuffix(" 1")
             + ")"
-            for parameter, spec in kind.ranges()
-        )
-        lines.append(f"| `{name}` | {kind.ABOUT} | {words} | {kind.SOURCE} |")
-    return "\n".join(lines) + "\n"
+            for parameter, spec in EFFECTS[name].ranges()
+        ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(listing())
