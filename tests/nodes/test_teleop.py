@@ -3,6 +3,8 @@
 import time
 
 from geometry_msgs.msg import TwistStamped
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import GetParameters
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from std_srvs.srv import Trigger
@@ -16,7 +18,7 @@ def joy(axis=0.0, *pressed):
     return message
 
 
-def test_a_gamepad_moves_the_hand_and_silence_stops_it(start, probe):
+def test_a_gamepad_moves_the_hand_by_the_missions_limits_and_silence_stops_it(start, probe):
     held = []
 
     def hold(_, response):
@@ -24,7 +26,13 @@ def test_a_gamepad_moves_the_hand_and_silence_stops_it(start, probe):
         response.success, response.message = True, "hold"
         return response
 
+    def limits(request, response):
+        assert list(request.names) == ["jog_speed", "jog_turn_rate"]
+        response.values = [ParameterValue(type=3, double_value=one) for one in (0.0175, 0.06)]
+        return response
+
     probe.node.create_service(Trigger, "mission/hold", hold)
+    probe.node.create_service(GetParameters, "mission/get_parameters", limits)
     start("uam_control.nodes.teleop")
     pad = probe.publisher(topics.JOY)
     twists, gripper = (
@@ -46,7 +54,7 @@ def test_a_gamepad_moves_the_hand_and_silence_stops_it(start, probe):
 
     send(joy(1.0, 4), lambda: len(twists) > 3, "twists")
     assert newest().header.frame_id == "world"
-    assert (newest().twist.linear.x, newest().twist.linear.y) == (0.1, 0.0)
+    assert (newest().twist.linear.x, newest().twist.linear.y) == (0.0175, 0.0)
     probe.until(lambda: newest().twist.linear.x == 0.0, "a twist of zeros after the last joy")
     count = len(twists)
     for _ in range(3):

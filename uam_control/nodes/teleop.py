@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 
 from geometry_msgs.msg import TwistStamped
+from rcl_interfaces.srv import GetParameters
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.task import Future
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -17,14 +20,17 @@ from uam_control.stages.gamepad import DEFAULT, Gamepad, Mapping, MappingError
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.node_names import MISSION
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.namespace import frame
-from uam_msgs_py.node.node_parameters import declared_text, refuse_unknown
+from uam_msgs_py.node.node_parameters import declared_text, plain, refuse_unknown
 
 NAME = "teleop"
 HOLD = "mission/hold"
+LIMITS = ["jog_speed", "jog_turn_rate"]  # of the mission
+EVERY = 1.0  # [s] they are asked for: they may be set in flight
 
 
 class Teleop:
@@ -40,7 +46,10 @@ class Teleop:
         self._twist = node.create_publisher(twist.type, twist.name, twist.qos)
         self._gripper = node.create_publisher(gripper.type, gripper.name, gripper.qos)
         self._hold = node.create_client(Trigger, HOLD)
+        self._limits = node.create_client(GetParameters, f"{MISSION}/get_parameters")
+        self._jog: tuple[float, float] | None = None  # [m/s], [rad/s] LIMITS
         self._heard = 0.0  # [s] time.monotonic() of the newest axes
+        self._asked = -math.inf  # [s] the same of the newest request for LIMITS
 
     def hear(self, axes: Sequence[float], buttons: Sequence[int]) -> None:
         """Take axes and buttons; a button acts at once. Raises ValueError, and stops then."""
@@ -53,11 +62,15 @@ class Teleop:
             self._say(f"gripper {gripper:g}")
 
     def tick(self) -> None:
-        """Send the twist; call it `rate` times a second."""
-        if time.monotonic() - self._heard > self._mapping.silent_after:
+        """Send the twist; call it `rate` times a second. Nothing without the mission's limits."""
+        now = time.monotonic()
+        if now - self._asked > EVERY and self._limits.service_is_ready():
+            self._asked = now
+            future = self._limits.call_async(GetParameters.Request(names=LIMITS))
+            future.add_done_callback(self._know)
+        if now - self._heard > self._mapping.silent_after:
             self._gamepad.silence()
-        twist = self._gamepad.twist()
-        if twist is None:
+        if self._jog is None or (twist := self._gamepad.twist(self._jog)) is None:
             return
         message = TwistStamped()
         message.header.frame_id = self._frame
@@ -66,6 +79,18 @@ class Teleop:
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = twist.tolist()
         self._twist.publish(message)
         self.sent += 1
+
+    def _know(self, done: Future) -> None:
+        values = [plain(one) for one in done.result().values]
+        if len(values) == len(LIMITS) and None not in values:
+            self._jog = tuple(values)
+
+    @property
+    def limits(self) -> str:
+        """Say what the end of an axis asks for."""
+        return (
+            "not known yet" if self._jog is None else "{:.3g} m/s, {:.3g} rad/s".format(*self._jog)
+        )
 
     def _call_hold(self) -> None:
         if not self._hold.service_is_ready():
@@ -106,7 +131,7 @@ class TeleopNode(UamNode):
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         level, summary = (WARN, self._problem) if self._problem else (OK, "running")
-        return level, summary, {"twists sent": self._teleop.sent}
+        return level, summary, {"twists sent": self._teleop.sent, "full stick": self._teleop.limits}
 
 
 def main() -> int:

@@ -29,8 +29,8 @@ class MappingError(ValueError):
 @dataclass(frozen=True)
 class Mapping:
     """frame: of FRAMES; dead_man, hold: buttons; rate [Hz]; silent_after, key_time [s];
-    axes: number of the axis and its largest velocity by row of the twist (0..5); gripper: value by
-    button; keys: (whether an axis, its number, value) by key."""
+    axes: number of the axis and its share of the limit, by row of the twist (0..5); gripper: value
+    by button; keys: (whether an axis, its number, value) by key."""
 
     frame: str
     dead_man: int
@@ -61,7 +61,7 @@ class Mapping:
             for column, letter in enumerate(NAMES):
                 if part.has(letter):
                     entry = part.section(letter)
-                    axes[3 * row + column] = _number(entry, "axis"), entry.number("largest")
+                    axes[3 * row + column] = _number(entry, "axis"), _share(entry)
                     entry.only_asked()
         pad = one.section("keys")
         found = cls(
@@ -76,6 +76,13 @@ class Mapping:
 
 def _number(section: Section, key: str) -> int:
     return section.whole(key, 0, MOST - 1)
+
+
+def _share(entry: Section) -> float:
+    value = entry.number("share", default=1.0)
+    if abs(value) > 1.0:
+        raise entry.error("share", f"{value:g} is not within -1..1")
+    return value
 
 
 def _key(entry: Section) -> tuple[bool, int, float]:
@@ -122,15 +129,15 @@ class Gamepad:
         """Ask for no motion until the next `read`."""
         self._axes = ()
 
-    def twist(self) -> np.ndarray | None:
+    def twist(self, limits: Sequence[float]) -> np.ndarray | None:
         """Return linear [m/s] and angular velocity [rad/s] (6,), None for nothing to send.
 
-        Zeros end a motion, once.
+        limits: speed [m/s] and turn rate [rad/s] at the end of an axis. Zeros end a motion, once.
         """
         twist = np.zeros(6)
-        for row, (number, largest) in self._mapping.axes.items() if len(self._axes) else ():
+        for row, (number, share) in self._mapping.axes.items() if len(self._axes) else ():
             value = min(1.0, max(-1.0, self._axes[number]))
-            twist[row] = largest * value * (abs(value) > self._mapping.dead_zone)
+            twist[row] = limits[row // 3] * share * value * (abs(value) > self._mapping.dead_zone)
         before, self._moving = self._moving, bool(twist.any())
         return twist if self._moving or before else None
 

@@ -62,12 +62,16 @@ def _serve(options: argparse.Namespace, mapping: Mapping, pressed: keys.Keys) ->
     with Guest("uam_teleop", environment, domain, namespace) as guest:
         operator, pad = Operator(guest.node), Keys(mapping)
         teleop, answered = Teleop(guest.node, mapping, say), operator.mission().answers
+        limits = ""
         say(f"keys: {' '.join(mapping.keys)}; {END}: end")
         while True:
             while key := pressed.pressed():
                 if key == END:
                     return
                 pad.press(key, time.monotonic())
+            if teleop.limits != limits:
+                limits = teleop.limits
+                say(f"at full speed: {limits}")
             teleop.hear(*pad.state(time.monotonic()))
             teleop.tick()
             operator.look(1.0 / mapping.rate)
