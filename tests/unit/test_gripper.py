@@ -19,7 +19,13 @@ from uam_control.mission import Mission, MissionParameters, ScenarioError, load_
 from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.settings import configuration
-from uam_control.vehicle import VehicleError, chain_of, derived_parameters, load_description
+from uam_control.vehicle import (
+    OpenEnd,
+    VehicleError,
+    chain_of,
+    derived_parameters,
+    load_description,
+)
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -221,6 +227,25 @@ def test_an_opening_closes_opens_or_is_refused():
     assert mission.command_gripper(0.02)[1].startswith("closes until")
     assert mission.command_gripper(0.05)[1].startswith("opens until")
     assert mission.command_gripper(0.08)[1] == "refused: opening 0.08 is outside 0.02 to 0.075"
+
+
+def test_an_opening_counts_until_the_fingers_close():
+    """The stroke is 20 to 75 mm; up to a tenth of it, 25.5 mm, a command closes them."""
+    fingers = OpenEnd(S500.gripper.opening)
+    assert (fingers.opening, fingers.commanded) == (0.075, False)
+    fingers.command(0.04)
+    assert (fingers.opening, fingers.commanded) == (0.04, True)
+    for closing_or_refused in (0.02, 0.0255, 0.08, math.nan):
+        fingers.command(closing_or_refused)
+        assert fingers.opening == 0.04
+    fingers.switch(False)
+    assert fingers.opening == 0.04
+    fingers.switch(True)
+    assert fingers.opening == 0.075
+    fingers.command(0.05)  # opens them from now on
+    fingers.switch(True)
+    fingers.switch(False)
+    assert fingers.opening == 0.05
 
 
 @pytest.fixture(scope="module")

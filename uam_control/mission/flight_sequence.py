@@ -52,12 +52,11 @@ from uam_control.supervision import (
     StateTransition,
     Supervisor,
 )
-from uam_control.vehicle import NO_GRIPPER, TWO_FINGER, VehicleDescription
+from uam_control.vehicle import NO_GRIPPER, TWO_FINGER, VehicleDescription, closes
 
 NOBODY = Authority()  # has taken control from the companion
 # landings after a hold that nobody asked for here: not where a stand is
 UNASKED = (Event.HELD_TOO_LONG, Event.CLEAR_TO_LAND)
-NEARLY = 0.1  # of a gripper's stroke: as near to its closed end, a command closes it
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
@@ -372,12 +371,11 @@ class FlightSequence:
     def command_gripper(self, opening: float) -> tuple[bool, str]:
         """Close or open the gripper as `switch_magnet` does; opening [m], 0 or 1 of a magnet."""
         p = self._parameters
-        closed, opened = p.gripper_opening
         if p.gripper == NO_GRIPPER:
             return False, "refused: the vehicle has no gripper"
-        if not min(closed, opened) <= opening <= max(closed, opened):
+        if (close := closes(opening, p.gripper_opening)) is None:
+            closed, opened = p.gripper_opening
             return False, f"refused: opening {opening:g} is outside {closed:g} to {opened:g}"
-        close = abs(opening - closed) <= NEARLY * abs(opened - closed)
         accepted, reason = self.switch_magnet(close)
         done = f"{'closes' if close else 'opens'} until the scenario grips or opens next"
         return accepted, done if accepted else reason

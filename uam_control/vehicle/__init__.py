@@ -14,7 +14,7 @@ from uam_control.vehicle.description import (
     Servo,
     VehicleDescription,
 )
-from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER, Gripper
+from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER, Gripper, OpenEnd, closes
 from uam_control.vehicle.loading import (
     AUTOPILOT_FILE,
     DEFAULT_VEHICLE,

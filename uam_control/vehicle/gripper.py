@@ -14,6 +14,7 @@ from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 
 KINDS = NO_GRIPPER, MAGNET, TWO_FINGER = "none", "magnet", "two_finger"
+NEARLY = 0.1  # of a gripper's stroke: as near to its closed end, a command closes it
 POSITIVE = (
     *("force", "speed", "friction", "transmission", "inertia", "stall_torque", "no_load_speed"),
     *("torque_per_current", "current_unit", "position_p_gain"),
@@ -39,6 +40,40 @@ class Gripper:
     def name(self) -> str:
         """Its name in texts."""
         return MAGNET if self.kind == MAGNET else "gripper"
+
+
+def closes(opening: float, ends: tuple[float, float]) -> bool | None:
+    """Return whether a command of `opening` closes a gripper; None: it is outside of the ends.
+
+    ends: closed and open, as `Gripper.opening`.
+    """
+    closed, opened = ends
+    if not min(ends) <= opening <= max(ends):
+        return None
+    return abs(opening - closed) <= NEARLY * abs(opened - closed)
+
+
+class OpenEnd:
+    """Where fingers that open come to: `opening` [m], as commanded until they close, else wide.
+
+    commanded: whether there was a command.
+    """
+
+    def __init__(self, ends: tuple[float, float]) -> None:
+        """ends: closed and open [m]."""
+        self._ends, self._closed = ends, False
+        self.opening, self.commanded = ends[1], False
+
+    def command(self, opening: float) -> None:
+        """Take a command; one that closes, or is refused, says nothing about the open end."""
+        if closes(opening, self._ends) is False:
+            self.opening, self.commanded = opening, True
+
+    def switch(self, closed: bool) -> None:
+        """Take whether the gripper is closed; with it the command is forgotten."""
+        if closed and not self._closed:
+            self.opening = self._ends[1]
+        self._closed = closed
 
 
 def gripper_of(numbers: dict[str, Any]) -> Gripper:

@@ -23,7 +23,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
 from uam_control.stamps import SECOND
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import OpenEnd, VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import GRIPPER, JointStateWriter, read_joint_command
@@ -98,7 +98,7 @@ class ArmDriverNode(UamNode):
         self._writer = JointStateWriter([*self._names, *hand])
         if hand:
             self._stroke = vehicle.gripper.opening
-            self._closes, self._open_to = False, self._stroke[1]
+            self._fingers = OpenEnd(self._stroke)
             self.listen(topics.MAGNET, self._on_grip)
             self.listen(topics.GRIPPER_COMMAND, self._on_opening, required=False)
         self._joints = self.publisher(topics.JOINTS)
@@ -144,12 +144,11 @@ class ArmDriverNode(UamNode):
         self.driver.command_position(read_joint_command(data, self._names))
 
     def _on_grip(self, message: Bool) -> None:
-        self._closes = message.data
-        self.driver.command_gripper(self._stroke[0] if self._closes else self._open_to)
+        self._fingers.switch(message.data)
+        self.driver.command_gripper(self._stroke[0] if message.data else self._fingers.opening)
 
     def _on_opening(self, message: Float64) -> None:
-        """Take the opening to which the fingers open from now on."""
-        self._open_to = min(max(message.data, self._stroke[0]), self._stroke[1])
+        self._fingers.command(message.data)
 
     def _on_reference(self, data: bytes) -> None:
         reference = read_reference(data, len(self._names))[1]

@@ -266,8 +266,8 @@ class Simulator:
             if self._faulty:
                 stamp, mission = self.answers.mission_stamp * 1e-9, self.answers.mission
                 self._faulty.mission_at(stamp, mission.time, mission.phase)
-            if self.answers.opening is not None:
-                self.plant.open_to(self.answers.opening)
+            if (fingers := self.answers.fingers) is not None and fingers.commanded:
+                self.plant.open_to(fingers.opening)
             try:
                 self.plant.step(self.hil.motors, self.answers.arm_command, self.answers.magnet)
             except PhysicsError as error:

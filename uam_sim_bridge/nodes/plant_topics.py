@@ -19,6 +19,7 @@ from uam_control.vehicle import (
     CURRENT_SERVO,
     POSITION_SERVO,
     TWO_FINGER,
+    OpenEnd,
     VehicleDescription,
 )
 from uam_msgs_py.messages import topics
@@ -223,8 +224,7 @@ class Answers:
         # NaN: no goal yet, the servos hold their position
         self.arm_command = np.full(len(self._names), np.nan if to_goals else 0.0)
         self.magnet = False
-        self._has_fingers = bool(_fingers(vehicle))
-        self.opening: float | None = None  # [m] to which fingers open, as last commanded
+        self.fingers = OpenEnd(vehicle.gripper.opening) if _fingers(vehicle) else None
         self.forget_mission()
         self.setpoints: dict[int, int] = {}
         self.arrivals: dict[str, float] = {}  # time.monotonic() of the newest, by topic
@@ -301,11 +301,13 @@ class Answers:
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
         self._arrived.add(MAGNET)
         self.magnet = read_switch(data)
+        if self.fingers is not None:
+            self.fingers.switch(self.magnet)
         self.arrivals[topics.MAGNET.name] = time.monotonic()
 
     def _on_gripper(self, message: Float64, info: dict | None = None) -> None:
-        if self._has_fingers:
-            self.opening = message.data
+        if self.fingers is not None:
+            self.fingers.command(message.data)
 
     def _on_restart(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.restarts += 1
