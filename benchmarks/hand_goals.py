@@ -3,13 +3,14 @@
     python benchmarks/hand_goals.py               # 200 goals inside, 30 outside, three vehicles
     python benchmarks/hand_goals.py --goals 10 --vehicle t650
     python benchmarks/hand_goals.py --jog         # whether the hand rests after the last twist
+    python benchmarks/hand_goals.py --jog --plant-preset laboratory
 
 A goal inside is the pose of the tool of a random base and random joints within their ranges, up to
 REACH from the place before; every second one is a place and a heading alone. It counts as reached
 with the true hand within 5 mm and 1 deg, in the mean of WINDOW, SETTLE after its plan has ended: a
 vehicle in the air wanders by some millimetres. A goal outside is below
 the floor, beyond the room of the base and the reach of the arm, or has no finite place. The
-hand of a vehicle whose hand hangs is where its hinge has it. Calm plant, seed 1.
+hand of a vehicle whose hand hangs is where its hinge has it. Seed 1.
 
 A jog is asked for at 0.3 m/s or 0.3 rad/s, so it is flown at its limits. The speed of the hand is
 the mean of 0.1 s; that in hover, and later, is one that nine of ten means do not exceed.
@@ -20,6 +21,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -45,8 +47,8 @@ ASKED = 0.3  # [m/s, rad/s]
 class Hovering:
     """A flight in the direct engine that hovers and takes goals."""
 
-    def __init__(self, name: str) -> None:
-        s = settings("hover", vehicle=name, engine="direct", seed=1)
+    def __init__(self, name: str, presets: Sequence[str] = ()) -> None:
+        s = settings("hover", vehicle=name, engine="direct", seed=1, plant_preset=presets)
         self.vehicle, self.flyer = s.vehicle, Flyer.of(s.vehicle)
         vehicle = Vehicle.of(s.vehicle).changed(s.vehicle_changes)
         self._flight = DirectFlight(s.scenario, s.profile, vehicle, s.payload_mass, s.seed)
@@ -150,9 +152,9 @@ def outside(flight: Hovering, rng: np.random.Generator) -> tuple[np.ndarray, str
     return wanted, "out of reach"
 
 
-def goals(name: str, count: int) -> None:
+def goals(name: str, presets: Sequence[str], count: int) -> None:
     """Print how the goals of a vehicle end."""
-    flight, rng, ends = Hovering(name), np.random.default_rng(1), Counter()
+    flight, rng, ends = Hovering(name, presets), np.random.default_rng(1), Counter()
     distances, turns = [], []
     for number in range(count):
         wanted = inside(flight, rng, number % 2 == 0)
@@ -181,9 +183,9 @@ def goals(name: str, count: int) -> None:
     print(f"{name}: {dict(ends)}; worst {worst[0]:.1f} mm, {worst[1]:.2f} deg; {outsiders}")
 
 
-def jog(name: str) -> None:
+def jog(name: str, presets: Sequence[str]) -> None:
     """Print how the true hand moves after the last of the twists, along and about each axis."""
-    flight = Hovering(name)
+    flight = Hovering(name, presets)
     flight.run(QUIET)
     hover = np.percentile(flight.speeds(QUIET), 90.0, axis=1)
     p = flight.limits
@@ -208,13 +210,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--vehicle", nargs="+", default=VEHICLES, help="names or files")
     parser.add_argument("--goals", type=int, default=GOALS, help=f"of each vehicle ({GOALS})")
+    parser.add_argument("--plant-preset", nargs="*", default=(), help="as of uam fly")
     parser.add_argument("--jog", action="store_true", help="the stop of a jog in place of goals")
     options = parser.parse_args()
     for name in options.vehicle:
         if options.jog:
-            jog(name)
+            jog(name, options.plant_preset)
         else:
-            goals(name, options.goals)
+            goals(name, options.plant_preset, options.goals)
 
 
 if __name__ == "__main__":
