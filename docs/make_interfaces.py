@@ -9,7 +9,8 @@ from uam_msgs_py.messages.serialized import type_name
 
 PAGE = Path(__file__).with_name("interfaces.md")
 BEGIN, END = "<!-- made by docs/make_interfaces.py -->\n", "<!-- end -->\n"
-HEAD = ("topic", "type", "QoS", "frame", "unit", "rate", "publisher", "who needs it")
+HEAD = ("topic", "type", "QoS", "frame: unit", "rate", "publisher", "who needs it")
+USUAL = "reliable, 32"
 
 
 def table() -> str:
@@ -32,10 +33,9 @@ def _row(topic: topics.Topic) -> tuple[str, ...]:
         f"`/{topic.name.removeprefix('/')}`",
         type_name(topic.type).replace("/msg/", "/"),
         _qos(topic),
-        topic.frame,
-        topic.unit,
+        f"{topic.frame}: {topic.unit}" if topic.frame else topic.unit,
         topic.rate,
-        topic.publisher + (not topic.one_publisher) * " (several allowed)",
+        topic.publisher + (not topic.one_publisher) * " +",
         readers,
     )
 
@@ -43,7 +43,8 @@ def _row(topic: topics.Topic) -> tuple[str, ...]:
 def _qos(topic: topics.Topic) -> str:
     offered = topic.qos
     latched = ", latched" if offered.durability.name == "TRANSIENT_LOCAL" else ""
-    return f"{offered.reliability.name.lower().replace('_', ' ')}{latched}, {offered.depth}"
+    reliable = offered.reliability.name.lower().replace("_", " ")
+    return f"{reliable}{latched}, {offered.depth}".replace(USUAL, "")
 
 
 if __name__ == "__main__":
