@@ -110,16 +110,13 @@ def _shown(value: float | list[float]) -> str:
 
 
 def table() -> str:
-    """Return effects and their sources in Markdown: of docs/plant.md."""
-    lines = ["| effect | does | source |", "|---|---|---|"]
-    lines += [
-        f"| `{name}` | {EFFECTS[name].ABOUT} | {EFFECTS[name].SOURCE} |" for name in usual_numbers()
-    ]
-    return "\n".join(lines) + "\n"
+    """Return the effects in Markdown: of docs/plant.md."""
+    rows = [f"| `{name}` | {EFFECTS[name].ABOUT} |" for name in usual_numbers()]
+    return "\n".join(["| effect | does |", "|---|---|", *rows]) + "\n"
 
 
 def listing() -> str:
-    """Return effects, parameters and usual numbers as text for a terminal."""
+    """Return effects, parameters with usual numbers, and sources as text for a terminal."""
     lines = []
     for name, values in usual_numbers().items():
         lines.append(f"{name}: {EFFECTS[name].ABOUT}")
@@ -129,6 +126,7 @@ def listing() -> str:
             + ")"
             for parameter, spec in EFFECTS[name].ranges()
         ]
+        lines.append(f"    source: {EFFECTS[name].SOURCE}")
     return "\n".join(lines)
 
 
