@@ -229,6 +229,42 @@ def test_the_stabilised_hand_takes_margin_from_the_axes_that_the_arm_pushes(vehi
     assert steered.setpoint_delay == pytest.approx(free.setpoint_delay, rel=0.02)
 
 
+def test_a_torque_setpoint_is_the_law_and_no_loop_of_the_autopilot_answers(vehicle):
+    """tau_q = -Mbar (lambda_1 e + lambda_2 e_dot); e_q = roll for a small roll."""
+    wrench = load_profile("s500", "wrench_any_law")
+    blocks = stack_model(wrench, vehicle).blocks
+    law = next(one for one in blocks if "setpoint.roll" in one.outputs)
+    motors = next(one for one in blocks if "motor.1" in one.outputs)
+    p = wrench.sets["attitude_controller"]
+    row = law.d[law.outputs.index("setpoint.roll")]
+    by_roll, by_rate = (row[law.inputs.index(f"state.roll{end}")] for end in ("", "_dot"))
+    assert by_roll / by_rate == pytest.approx(p.lambda_1[0] / p.lambda_2[0], rel=0.02)
+    gyro = [motors.inputs.index(f"true.{name}_dot") for name in ("roll", "pitch", "yaw")]
+    rates = next(
+        one for one in stack_model(load_profile("s500"), vehicle).blocks if "motor.1" in one.outputs
+    )
+    assert not motors.d[:, gyro].any() and not len(motors.a)
+    assert rates.d[:, gyro].any() and len(rates.a)
+
+
+def test_the_whole_body_law_has_the_margin_of_its_flights():
+    """Its hover survives setpoints 20 ms later, with 28 ms it ends early: docs/duel.md."""
+    described = load_description("t650")
+    base = default_profile("whole_body_l1", described)
+    profile = load_profile("fsc_whole_body", vehicle=described, onto=base.sections)
+    found = analyse(stack_model(profile, Vehicle.of(described)))
+    assert found.stable and 0.020 < found.setpoint_delay < 0.028
+    # without what L1 takes off the force, the position has more phase
+    still = {
+        node: replace(profile.sets[node], l1_cutoff=1e-6)
+        for node in ("position_controller", "attitude_controller", "arm_controller")
+    }
+    calmer = analyse(
+        stack_model(replace(profile, sets=profile.sets | still), Vehicle.of(described))
+    )
+    assert calmer.loops["x"][1].phase > found.loops["x"][1].phase + 5.0
+
+
 def test_poses_may_be_older_for_a_slower_observer():
     slow, fast = (EstimatorParameters(position_bandwidth=w) for w in (12.0, 30.0))
     assert remaining(slow, 0.012, 0.004, 120.0) < 0.01

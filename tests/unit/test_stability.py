@@ -187,6 +187,9 @@ def test_a_real_flight(analysed):
     # the known load of the arm is fed forward; the rest is the payload's
     arm_shares = arm["coupling"]["feedforward_share"] + arm["coupling"]["adaptive_share"]
     assert 0.9 < arm_shares < 1.1
+    assert 0.4 < arm["coupling"]["adaptive_share"] < 0.5
+    assert 0.8 < arm["coupling"]["unknown_share"] < 1.1
+    assert 0.8 < position["coupling"]["unknown_share"] < 1.1
     assert arm["coupling"]["actuators_share"] is None
     assert position["xi_max"] < position["xi_bound"]
     assert found["assumptions"]["saturated"]["position"] < 0.01

@@ -17,7 +17,6 @@ from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
 from uam_control.settings.parameter_file import ProfileError
 from uam_control.vehicle import load_description
-from uam_lab.experiments.margins.kept import judged
 
 DT, G = 0.004, 9.81
 VEHICLE = load_description("t650")
@@ -199,11 +198,6 @@ def test_the_profile_has_the_published_gains():
     np.testing.assert_allclose(
         np.array(arm.task_lambda_2) * [1, 1, 1, 0.05], [26.82] * 3 + [0.2903]
     )
-
-
-def test_margins_are_not_those_of_three_laws_by_themselves():
-    profile = default_profile("whole_body_l1")
-    assert profile.whole and not judged(profile) and judged(default_profile("geometric"))
 
 
 def test_the_attitude_of_a_turning_thrust_has_its_rates():

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class GeometricParameters(LawParameters):
     inertia: tuple = vector((), "Mbar, its diagonal", "kg or kg m^2", TINY, 1e3)
     lambda_1: tuple = vector((), "lambda_1, gain on e", "1/s^2", TINY, HUGE)
     lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
+
+    def linear(self) -> Self:
+        """See `LawParameters.linear`; what L1, INDI and the whole-body law adapt is linear."""
+        return self
 
 
 @dataclass(frozen=True)

@@ -227,12 +227,13 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
     vehicle: None for the default one; its description may name a profile for the law.
 
     A law without its own profile uses the default law's values for the parameters that both laws
-    have (same name, meaning, unit and range), and defaults for the others.
+    have (same name, meaning, unit and range), and defaults for the others. What the vehicle names
+    for a law that is not the default one replaces single parameters of these.
     """
     vehicle = vehicle or load_description()
     if not vehicle.profile(catalogue.DEFAULT):
         raise ProfileError(f"{vehicle.file}: no profile: uam vehicle design {vehicle.source}")
-    if own := own_profile(law, vehicle):
+    if (own := own_profile(law, vehicle)) and is_complete(law, vehicle):
         return load_profile(own, vehicle=vehicle)
     sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)
     for node in CONTROLLERS:
@@ -240,7 +241,15 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
         specs = parameter_set(node, {"law": law}, vehicle)[0].specs()
         shared = {k: v for k, v in sections[node].items() if specs.get(k) == known[k]}
         sections[node] = {"law": law} | shared
+    if own:
+        return load_profile(own, vehicle=vehicle, onto=sections)
     return profile_of(sections, Path(f"{law}.yaml"), vehicle)
+
+
+def is_complete(law: str, vehicle: VehicleDescription) -> bool:
+    """Return whether the law's own profile stands for itself, see `default_profile`."""
+    named = law != catalogue.DEFAULT and vehicle.profile(law)
+    return bool(own_profile(law, vehicle)) and not named
 
 
 def _file(name_or_file: str) -> Path:

@@ -125,7 +125,8 @@ def check(
 def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> dict[str, Any]:
     """Return the RMS [N, N m] of the true coupling force and of each term against it, per axis.
 
-    *_share: the part of the coupling that a term compensates, <term, H> / <H, H> over all axes.
+    *_share: the part of the coupling that a term compensates, <term, H> / <H, H> over all axes;
+    unknown_rms, unknown_share: of what is not fed forward, and the adaptive term's part of it.
     """
     plant = forces.plant[:, columns]
     met = {
@@ -136,13 +137,21 @@ def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> d
         "actuators": (terms.applied - terms.tau)[:, columns],
     }
     found = {"rms": rms(plant), "rest_rms": rms(forces.rest[:, columns])}
-    power = float(np.sum(plant**2))
     for name, term in met.items():
         found[f"{name}_rms"] = rms(term)
-        found[f"{name}_share"] = float(np.sum(term * plant)) / power if power else None
+        found[f"{name}_share"] = share(term, plant)
+    unknown = plant - terms.known[:, columns]
+    found["unknown_rms"] = rms(unknown)
+    found["unknown_share"] = share(met["adaptive"], unknown)
     if columns == COLUMNS_OF["arm"]:  # the torque of its servos is not recorded
         found["actuators_rms"] = found["actuators_share"] = None
     return found
+
+
+def share(term: np.ndarray, force: np.ndarray) -> float | None:
+    """Return <term, force> / <force, force>, both (m, axes); None without a force."""
+    power = float(np.sum(force**2))
+    return float(np.sum(term * force)) / power if power else None
 
 
 def rms(values: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ class Supply:
     feedback: np.ndarray  # -Mbar Lambda xi
     adaptive: np.ndarray  # -Mbar dtau
     weight: np.ndarray  # gravity_feedforward_mass g e3
+    known: np.ndarray  # of the feedforward, what is not Mbar chi_d_ddot
     integral: np.ndarray  # -Mbar times the integral action of position and arm
     tau: np.ndarray  # as recorded, after its limits
     applied: np.ndarray  # force and torque of the rotors; tau for the arm (no recorded torque)
@@ -40,11 +41,12 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     estimate: errors of the estimated state, the input of the law. sets: parameter sets by node.
     """
     shape = (len(rows), series.columns.size)
-    feedback, adaptive, weight, integral = (np.zeros(shape) for _ in range(4))
+    feedback, adaptive, weight, integral, planned = (np.zeros(shape) for _ in range(5))
     for name, columns in COLUMNS_OF.items():
         p = sets[NODE_OF[name]].record()[0]
         e, e_dot = estimate.e[:, columns], estimate.e_dot[:, columns]
         feedback[:, columns] = -p["inertia"] * (p["gain_e"] * e + p["gain_e_dot"] * e_dot)
+        planned[:, columns] = p["inertia"] * estimate.acceleration_d[:, columns]
         r = p["p12"] * e + p["p22"] * e_dot
         length = np.linalg.norm(r, axis=1)
         scale = series[f"adaptation.{name}.rho"][rows] / np.maximum(length, p["varpi"])
@@ -58,7 +60,8 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
         integral[:, COLUMNS_OF[name]] = action[rows]
     feedforward = recorded - feedback - adaptive - weight - integral
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
-    return Supply(feedforward, feedback, adaptive, weight, integral, recorded, applied)
+    known = feedforward - planned
+    return Supply(feedforward, feedback, adaptive, weight, known, integral, recorded, applied)
 
 
 def bias(series: Series, subsystem: str) -> np.ndarray:

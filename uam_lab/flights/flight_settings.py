@@ -16,7 +16,7 @@ from uam_control.profiles.profile import (
     Profile,
     default_profile,
     load_profile,
-    own_profile,
+    is_complete,
 )
 from uam_control.profiles.profile_fit import misfits
 from uam_control.settings import configuration
@@ -227,7 +227,7 @@ def _profile(
         profile = default_profile(o.controller, vehicle)
     else:
         # a file may have a part of the parameters where there is no name for the others
-        own = own_profile(o.controller, vehicle)
+        own = is_complete(o.controller, vehicle)
         profile = load_profile(
             *(str(configuration.named("profiles", str(one))) for one in o.profile),
             vehicle=vehicle,

@@ -271,8 +271,7 @@ class Autopilot:
                 )
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
         if self._flew_rates and commander.armed and self._torque is not None:
-            self._memory[TORQUE], self._memory[INTEGRAL] = self._torque, 0.0
-            drive_motors(setpoint[3], self._loop)
+            self.allocate(self._torque, setpoint[3])
         if commander.stopped:
             self.motors[:] = 0.0
         velocity = self._velocity
@@ -287,6 +286,15 @@ class Autopilot:
         gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust 0..1.
         """
         self._cycle(gyro, dt, True, False, setpoint)
+        return self.motors
+
+    def allocate(self, torque: np.ndarray, thrust: float) -> np.ndarray:
+        """Drive the motors without the rate loop; return `motors`.
+
+        torque (3,): normalised, FRD; thrust 0..1.
+        """
+        self._memory[TORQUE], self._memory[INTEGRAL] = torque, 0.0
+        drive_motors(thrust, self._loop)
         return self.motors
 
     def _cycle(

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from uam_control.profiles.profile import BRIDGE, Profile
+from uam_control.profiles.profile import Profile
 from uam_control.vehicle import CURRENT_SERVO
 from uam_lab.experiments.margins.cases import cases_of
 from uam_lab.experiments.margins.loops import Analysis
 from uam_lab.experiments.margins.report import Case
+from uam_lab.experiments.margins.stack_model import MODELLED, setpoint_of
 from uam_sim_bridge.plant import Vehicle
 
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to that of the vehicle
@@ -20,10 +21,10 @@ LEAST_GAIN, MOST_PEAK = 3.0, 4.0  # [dB]; largest sensitivity
 
 
 def judged(profile: Profile) -> bool:
-    """Return whether the model has the profile's laws, each by itself, and its setpoints: body
-    rates, and torques of joints."""
-    rates = profile.section(BRIDGE).get("setpoint", "rates") == "rates"
-    return rates and not profile.whole and profile.sets["arm_controller"].setpoint == CURRENT_SERVO
+    """Return whether the model has the profile's setpoints: body rates or torques of the base, and
+    torques of the joints."""
+    servos = profile.sets["arm_controller"].setpoint
+    return setpoint_of(profile) in MODELLED and servos == CURRENT_SERVO
 
 
 def missed(profile: Profile, payloads: Sequence[float]) -> tuple[str, ...]:

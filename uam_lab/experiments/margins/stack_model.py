@@ -6,8 +6,8 @@
 | estimate of base | exact: IMU and motion capture agree (`estimator_margin` for the rest) |
 | estimate of joints | `StateEstimator.joints` |
 | hand: correction of the arm's reference | `HandStage`, faded in; only with a `hand_bandwidth` |
-| laws, desired attitude, map to body rates and thrust | stages of `ControlTick`, `RateThrustMap` |
-| rate loop, allocation | `Autopilot.rate_loop` |
+| laws, desired attitude, map to the setpoint | stages of `ControlTick`, `RateThrustMap` |
+| rate loop, allocation | `Autopilot.rate_loop`; of torque setpoints `Autopilot.allocate` alone |
 | rotors, rigid bodies, servos | `plant_model` |
 """
 
@@ -19,18 +19,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uam_control.control.hand_steering import FADE
-from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
+from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import CONTROLLERS, Profile
-from uam_control.stages.control_tick import control_arm, control_attitude, control_position
+from uam_control.profiles.profile import BRIDGE, CONTROLLERS, Profile
+from uam_control.stages.control_tick import (
+    control_arm,
+    control_attitude,
+    control_position,
+    control_whole_body,
+)
 from uam_lab.experiments.margins.linear import LinearBlock, delay, linearise
 from uam_lab.experiments.margins.plant_model import Hover, plant_model
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 
-RATES = ("setpoint.roll", "setpoint.pitch", "setpoint.yaw")  # body rates [rad/s, FLU]
+RATES = ("setpoint.roll", "setpoint.pitch", "setpoint.yaw")  # body rates [rad/s] or torque, FLU
 THRUST = "setpoint.thrust"
+WRENCH, MODELLED = "wrench", ("rates", "wrench")  # setpoint types
+LAWS = control_position, control_attitude, control_arm
 Gains = Mapping[str, np.ndarray]  # subsystem → adapted gains, the first values of its `adaptation`
 
 
@@ -65,6 +72,7 @@ def stack_model(
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)
     posture = described.stowed if arm is None else arm
     plant, hover = plant_model(vehicle, payload_mass, posture, dry)
+    wrench = setpoint_of(profile) == WRENCH
     names = described.coordinates
     base = tuple(f"{name}{end}" for end in ("", "_dot") for name in names[: ARM.start])
     sensors = numbers["sensors"]
@@ -73,11 +81,16 @@ def stack_model(
         delay(_of("true", base), _of("state", base), sensors["imu"]["latency_ticks"]),
         *_joints(flight, names[ARM], sensors["joints"]["latency_ticks"]),
         *_hand(flight, names, posture),
-        _laws(flight, names, hover, gains or {}),
+        _laws(flight, names, hover, posture, gains or {}, wrench),
         delay((*RATES, THRUST), _of("arrived", (*RATES, THRUST)), late_setpoints),
-        _autopilot(flight, hover),
+        _autopilot(flight, hover, wrench),
     )
     return Stack(blocks, described.control_period, names)
+
+
+def setpoint_of(profile: Profile) -> str:
+    """Return the type of the profile's setpoints."""
+    return profile.section(BRIDGE).get("setpoint", "rates")
 
 
 def _of(stage: str, names: Sequence[str]) -> tuple[str, ...]:
@@ -127,28 +140,40 @@ def _hand(
     return (linearise(step, [hand], _of("state", base), hand_signals(joints)),)
 
 
-def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains) -> LinearBlock:
-    """Return the three laws and the map: state → setpoint, effort."""
+def _laws(
+    flight: DirectFlight,
+    names: Sequence[str],
+    hover: Hover,
+    posture: Sequence[float],
+    gains: Gains,
+    wrench: bool,
+) -> LinearBlock:
+    """Return the three laws, or that of the whole body, and the map: state → setpoint, effort."""
     control, signals, size = flight.control, flight.control.signals, len(names)
-    signals.flying, weight = True, hover.weight
+    signals.flying, weight, hand = True, hover.weight, control.hand
+    signals.reference[CHI, ARM] = posture
     period = round(flight.plant.period * 1e9)
-    corrections = hand_signals(names[ARM]) if control.hand.steers else ()
-    steered = control.hand.arrays.reference[:CHI_DDOT, ARM]
+    corrections = hand_signals(names[ARM]) if hand.steers else ()
+    steered, setpoints = hand.arrays.reference, control.bridge.map
+    stages = (control_whole_body,) if control.whole else LAWS
 
     def step(given: np.ndarray) -> np.ndarray:
         given, correction = given[: 2 * size], given[2 * size :]
         signals.stamp += period
         signals.state[CHI], signals.state[CHI_DOT] = given[:size], given[size:]
-        steered[:] = correction.reshape(2, -1) if len(correction) else 0.0
-        control_position(control)
-        control_attitude(control)
-        control_arm(control)
-        rates, thrust = control.bridge.map.map(
-            signals.tau_p, signals.tau_q, signals.state[CHI, ATTITUDE], given[size:][ATTITUDE]
-        )
-        return np.concatenate([rates, [thrust], signals.tau_alpha])
+        steered[:] = signals.reference
+        if len(correction):
+            steered[:CHI_DDOT, ARM] += correction.reshape(2, -1)
+        for stage in stages:
+            stage(control)
+        tau_q = signals.tau_q
+        sent, thrust = setpoints.map_state(signals.tau_p, tau_q, signals.state)
+        if wrench:
+            sent = setpoints.normalised(tau_q, thrust)
+        return np.concatenate([sent, [thrust], signals.tau_alpha])
 
     still = np.zeros(2 * size + len(corrections))
+    still[:size][ARM] = posture
     step(still)
     # thrust of the operating point: the payload's weight as desired acceleration
     signals.reference[CHI_DDOT, Z] = (weight - signals.tau_p[2]) * (
@@ -160,10 +185,10 @@ def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains
     laws = [stage.controller for stage in control.laws.values()]
     inputs = (*_of("state", (*names, *(f"{name}_dot" for name in names))), *corrections)
     outputs = (*RATES, THRUST, *_of("effort", names[ARM]))
-    return linearise(step, laws, inputs, outputs)
+    return linearise(step, laws, inputs, outputs, still)
 
 
-def _autopilot(flight: DirectFlight, hover: Hover) -> LinearBlock:
+def _autopilot(flight: DirectFlight, hover: Hover, wrench: bool) -> LinearBlock:
     """Return the autopilot's rate loop: arrived setpoint, gyro → motor commands."""
     autopilot, period = flight.autopilot.autopilot, flight.plant.period
     rates, thrust = flight.control.bridge.map.map(
@@ -173,6 +198,8 @@ def _autopilot(flight: DirectFlight, hover: Hover) -> LinearBlock:
 
     def step(given: np.ndarray) -> np.ndarray:
         setpoint[:3], setpoint[3] = swap_body(given[:3]), given[3]
+        if wrench:
+            return autopilot.allocate(setpoint[:3], setpoint[3]).copy()
         return autopilot.rate_loop(swap_body(given[3 + 1 :]), period, setpoint).copy()
 
     at = np.array([*np.zeros(3), thrust, *np.zeros(3)])

@@ -72,7 +72,8 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
 
 def _row(name: str, one: Mapping[str, Any]) -> StabilityRow:
     value, shares = one["V"], one["coupling"]
-    met = (("adaptive_share", "adaptive"), ("feedback_share", "feedback"),
+    met = (("adaptive_share", "adaptive"), ("unknown_share", "adaptive of what is unknown"),
+           ("feedback_share", "feedback"),
            ("integral_share", "integral action"), ("actuators_share", "actuators"))  # fmt: skip
     return StabilityRow(
         name=name,
