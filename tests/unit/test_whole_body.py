@@ -20,8 +20,8 @@ from uam_control.vehicle import load_description
 
 DT, G = 0.004, 9.81
 VEHICLE = load_description("t650")
-SECTIONS = default_profile("whole_body_l1", VEHICLE).sections
-SETS = load_profile("fsc_whole_body", vehicle=VEHICLE, onto=SECTIONS).sets
+PROFILE = default_profile("whole_body_l1", VEHICLE)  # config/vehicle/t650.yaml names fsc_whole_body
+SETS = PROFILE.sets
 HOME = np.radians([0.0, 40.0, 40.0, 0.0])
 
 
@@ -172,7 +172,7 @@ def test_any_arm_of_one_to_seven_joints(seed):
 
 
 def test_one_law_for_some_of_the_controllers_is_refused():
-    mixed = {node: dict(section) for node, section in SECTIONS.items()}
+    mixed = {node: dict(section) for node, section in PROFILE.sections.items()}
     mixed["attitude_controller"] = {**mixed["attitude_controller"], "law": "geometric"}
     text = (
         "whole_body_l1 is one law of all three controllers, but attitude_controller has geometric"
@@ -198,6 +198,15 @@ def test_the_profile_has_the_published_gains():
     np.testing.assert_allclose(
         np.array(arm.task_lambda_2) * [1, 1, 1, 0.05], [26.82] * 3 + [0.2903]
     )
+
+
+def test_the_t650_names_single_parameters_beside_the_default_laws():
+    """As printed: 12.58 N s/m / 3.746174 kg; the estimator is that of the profile t650."""
+    assert PROFILE.section("mavlink_bridge")["setpoint"] == "wrench"
+    assert SETS["position_controller"].lambda_2 == (3.3581,) * 3
+    assert SETS["state_estimator"].joint_velocity == "observer"
+    again = load_profile("fsc_whole_body", vehicle=VEHICLE, onto=PROFILE.sections)
+    assert again.sets == SETS
 
 
 def test_the_attitude_of_a_turning_thrust_has_its_rates():
