@@ -15,8 +15,8 @@ from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_sce
 from uam_control.profiles.profile import (
     Profile,
     default_profile,
-    load_profile,
     is_complete,
+    load_profile,
 )
 from uam_control.profiles.profile_fit import misfits
 from uam_control.settings import configuration
