@@ -8,7 +8,7 @@ topics.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -164,14 +164,14 @@ class ControlTick:
         return all(stage.run(self) for stage in self.stages[first:])
 
     def insert(
-        self, before: str, name: str, run: Callable[[ControlTick], bool], decides: bool = True
+        self, before: str, name: str, run: Callable[[ControlTick], bool], **more: Any
     ) -> None:
         """Insert a stage before the stage `before`; raises ValueError if it does not exist.
 
-        run, decides: see `Stage`.
+        run, more: fields of the `Stage`.
         """
         names = [stage.name for stage in self.stages]
-        self.stages.insert(names.index(before), Stage(name, run, decides=decides))
+        self.stages.insert(names.index(before), Stage(name, run, **more))
 
 
 def listen(tick: ControlTick) -> bool:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.maths.compiled import borrowing
+from uam_control.stages.step import DONE, Step
 from uam_sim_bridge.faults.fault import LINK
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut, MavlinkDelay
@@ -66,6 +68,10 @@ class DirectFaults:
         if isinstance(plant, FaultyPlant):
             self._timelines.append(plant.timeline)
 
+    def step(self, tick: object) -> Step | None:
+        """Return the compiled step of a tick that sets no time; None with faults of the link."""
+        return None if self.link.timeline.all else Step(unchanged, ())
+
     def update(self, stamp: float, time: float, phase: str) -> None:
         """Set mission time [s] and phase of the control tick at `stamp` [s]."""
         for timeline in self._timelines:
@@ -77,3 +83,9 @@ class DirectFaults:
         """Return the records of all faults that have begun, in order of time."""
         found = [record for timeline in self._timelines for record in timeline.records]
         return sorted(found, key=lambda record: record["begin_s"])
+
+
+@borrowing
+def unchanged(arrays: tuple) -> int:
+    """Do nothing: mission time and phase are as the stamp tells until the objects change them."""
+    return DONE

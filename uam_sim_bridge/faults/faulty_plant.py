@@ -57,26 +57,36 @@ def _physical(faults: Schedule) -> list[str]:
 class FaultyPlant(Plant):
     """A plant with faults that begin and end at mission times; `mission_at` sets the time.
 
-    `inner`: the plant of the physics engine.
+    `inner`: the plant of the physics engine. `senses`, `acts`: whether it changes samples, and
+    commands or physics, until the next fault begins or ends.
     """
 
     def __init__(self, inner: Plant, schedule: Schedule) -> None:
         """schedule: faults of the plant only."""
-        super().__init__(inner.vehicle)
         self.inner = inner
+        super().__init__(inner.vehicle)
+        self.senses = self.acts = False
         self.timeline = Timeline(schedule)
         self.changed: list[FaultState] = []  # faults that began or ended at this tick
         self._active: dict[int, tuple[PlantFault, Occurrence]] = {}
-        self._touched = False
         streams = np.random.SeedSequence(schedule.seed, spawn_key=(0xFA,)).spawn(
             len(schedule.faults)
         )
         self._noise = [np.random.default_rng(stream) for stream in streams]
 
-    def count_from(self, tick: int) -> None:
-        """See `Plant.count_from`."""
-        super().count_from(tick)
-        self.inner.count_from(tick)
+    @property
+    def tick(self) -> int:
+        """The tick of the inner plant."""
+        return self.inner.tick
+
+    @tick.setter
+    def tick(self, tick: int) -> None:
+        self.inner.tick = tick
+
+    @property
+    def physics(self) -> Plant:
+        """See `Plant.physics`."""
+        return self.inner
 
     def mission_at(self, stamp: float, time: float, phase: str) -> None:
         """See `Timeline.mission_at`."""
@@ -94,12 +104,27 @@ class FaultyPlant(Plant):
 
     def _begin_and_end(self) -> None:
         """Find the faults that are active at this tick."""
+        for _, now in self._active.values():
+            now.since += self.period
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
                 self._active[one.number] = one.fault, Occurrence(self._noise[one.number])
             else:
                 del self._active[one.number]
+        if self.changed:
+            self.senses = any(
+                type(fault).sense is not PlantFault.sense for fault, _ in self._active.values()
+            )
+            self.acts = self.acts or self._acting  # once more after the end: that undoes it
+
+    @property
+    def _acting(self) -> bool:
+        return any(type(fault).act is not PlantFault.act for fault, _ in self._active.values())
+
+    def unchanged_for(self) -> float:
+        """Return for how many ticks from this one on no fault begins or ends; inf: to the end."""
+        return self.timeline.unchanged_for(self.time) / self.period
 
     def _changed(self, samples: Samples) -> Samples:
         """Return the samples, changed by the active faults."""
@@ -112,20 +137,18 @@ class FaultyPlant(Plant):
 
         Arguments as in `Plant.step`.
         """
-        if self._active or self._touched:
+        if self.acts:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_command), bool(magnet))
             described = self.vehicle.description
             physics = Disturbance.none(len(described.rotors), len(described.joints))
             for fault, now in self._active.values():
                 fault.act(commands, physics, now)
-                now.since += self.period
             if self.inner.DISTURBABLE:
                 self.inner.disturb(physics)
             motor_commands, arm_command = commands.motors, commands.effort
             magnet = commands.magnet
-            self._touched = bool(self._active)
+            self.acts = self._acting
         self.inner.step(motor_commands, arm_command, magnet)
-        self.tick = self.inner.tick
 
     def truth(self) -> Truth:
         """Return the truth of the inner plant."""

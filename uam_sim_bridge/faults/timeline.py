@@ -110,6 +110,16 @@ class Timeline:
         )
         return changed
 
+    def unchanged_for(self, stamp: float) -> float:
+        """Return how long from `stamp` [s] on `update` changes nothing, if no phase begins [s]."""
+        if not self._pending:
+            return math.inf
+        if self._takeoff is None:
+            return 0.0
+        begins = ((one, self._phases.begin(one.planned)) for one in self.all if one.end is None)
+        times = (begin + (one.planned.duration if one.active else 0.0) for one, begin in begins)
+        return max(0.0, self._takeoff + min(times) - TOLERANCE - stamp)
+
     @property
     def records(self) -> list[dict[str, Any]]:
         """Return the records of all faults that have begun, in the order of the schedule."""

@@ -85,6 +85,7 @@ class MujocoPlant(Plant):
 
         mujoco.mj_forward(model, data)
         self._specific_force = self._sensed_force.copy()
+        self._drawn = range(0)  # ticks for which there is noise
         self._added_wind = np.zeros(3)  # by disturbances
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
         self._hinge = PayloadHinge(model, data) if hinged else None
@@ -267,7 +268,7 @@ class MujocoPlant(Plant):
 
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`."""
-        self.draw_noise()
+        self._draw_due()
         self._sense(row)
         self.effects.check()
         return self.arrived()
@@ -275,13 +276,21 @@ class MujocoPlant(Plant):
     @property
     def compiled(self) -> bool:
         """Whether `sense` and `step` of `plant_tick` are all that a tick does."""
-        return self.effects.compiled and self._hinge is None
+        hinge = self._hinge
+        free = hinge is None or (self._swing_rate is None and not hinge.closed)
+        return self.effects.compiled and free
 
     def draw_noise(self) -> int:
         """Draw the noise that is due; return for how many ticks it lasts at least."""
         gusts = self._gust.draw() if self.gusty else BLOCK
         poses = self._mocap.draw(self.period)
-        return min(self._imu.noise.draw(), poses, gusts, self.effects.draw())
+        lasts = min(self._imu.noise.draw(), poses, gusts, self.effects.draw())
+        self._drawn = range(self.tick, self.tick + lasts)
+        return lasts
+
+    def _draw_due(self) -> None:
+        if self.tick not in self._drawn:
+            self.draw_noise()
 
     def arrived(self) -> Samples:
         """Return the samples that have arrived at this tick, as copies."""
@@ -290,9 +299,10 @@ class MujocoPlant(Plant):
         imu = self.imu(tick - self.imu_late) if self.imu_late else hil
         grip = None
         if joints is not None:
-            *parts, found = np.split(joints[6:], (n, 2 * n, 3 * n))
-            joints = (taken * self.period, *parts)
-            grip = (joints[0], found) if len(self._fingers.opening) else None
+            ends = [6 + i * n for i in range(4)]
+            if len(self._fingers.opening):
+                grip = (taken * self.period, joints[ends[-1] :])
+            joints = (taken * self.period, *(joints[i : i + n] for i in ends[:-1]))
         poses, payloads = map(self._mocap.arrived, (VEHICLE_POSE, PAYLOAD_POSE))
         payload = payloads[-1] if payloads else None
         samples = Samples(imu, joints, None, hil, payload=payload, grip=grip)
@@ -310,7 +320,7 @@ class MujocoPlant(Plant):
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
-        self.draw_noise()
+        self._draw_due()
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
         error = self._step(motor_commands, arm_command, magnet)

@@ -153,11 +153,13 @@ class Plant(ABC):
     periods stepped; `truth_row`: the places in the row of `observe`. `DISTURBABLE`: whether the
     class implements `disturb`; if not, faults of the physics are refused, faults of sensors and
     commands are accepted. `HAS_EFFECTS`: whether it simulates the effects of a preset
-    (`vehicle.numbers["effects"]`); if not, presets are refused.
+    (`vehicle.numbers["effects"]`); if not, presets are refused. `senses`, `acts`: whether this
+    plant changes samples, and commands or physics, of the one in `physics`.
     """
 
     DISTURBABLE = True
     HAS_EFFECTS = False
+    senses = acts = False
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
@@ -165,6 +167,15 @@ class Plant(ABC):
         self.joints = len(vehicle.description.joints)
         self.tick = 0
         self.truth_row = TruthRow.of(vehicle.description)
+
+    @property
+    def physics(self) -> Plant:
+        """The plant that samples and steps the physics: this one, or the one that it changes."""
+        return self
+
+    def unchanged_for(self) -> float:
+        """Return for how many ticks `senses` and `acts` stay as they are; inf: to the end."""
+        return math.inf
 
     @property
     def time(self) -> float:

@@ -129,6 +129,7 @@ class CompiledTicks:
             *(type(one.controller.law).step for one in control.laws.values()),
             *(control.mission.inputs.arrays, control.mission.mission.arrays),
             *(control.bridge.map.curve, flight.autopilot.autopilot.arrays),
+            *(self._sampled, self._stepped),
             *(flight.autopilot.steps, flight.recorder.arrays),
         )
         if len(made) != len(self._made) or not all(map(is_, made, self._made)):
@@ -159,15 +160,26 @@ class CompiledTicks:
 
     @property
     def _compiled_plant(self) -> bool:
-        plant = self._flight.plant
+        plant = self._flight.plant.physics
         return type(plant) is MujocoPlant and plant.compiled
+
+    @property
+    def _sampled(self) -> bool:
+        """Whether a compiled step samples the plant."""
+        return self._compiled_plant and not self._flight.plant.senses
+
+    @property
+    def _stepped(self) -> bool:
+        """Whether a compiled step advances the physics."""
+        return self._compiled_plant and not self._flight.plant.acts
 
     def _sensors(self) -> Step | None:
         flight, arrays = self._flight, self._flight.recorder.arrays
-        if not (self._compiled_plant and self._joined) or flight.autopilot_imu:
+        if not (self._sampled and self._joined) or flight.autopilot_imu:
             return None
         of_tick = arrays.ring, arrays.motors, arrays.numbers, flight.autopilot.memory
-        return Step(sense_step, (flight.plant.arrays, arrays.signals, self._sample, *of_tick))
+        plant = flight.plant.physics
+        return Step(sense_step, (plant.arrays, arrays.signals, self._sample, *of_tick))
 
     def _cycle(self) -> Step | None:
         if not self._joined:
@@ -176,11 +188,11 @@ class CompiledTicks:
 
     def _physics(self) -> Step | None:
         flight, arrays = self._flight, self._flight.recorder.arrays
-        if not self._compiled_plant:
+        if not self._stepped:
             return None
         command = flight.control.signals.arm_command
         of_tick = arrays.motors, command, arrays.numbers, self._fault
-        return Step(push_step, (flight.plant.arrays, *of_tick))
+        return Step(push_step, (flight.plant.physics.arrays, *of_tick))
 
     def _stretch(self, count: int, enough: int, most: int) -> tuple[int, int]:
         """Fly until `enough` ticks are flown, at most `most`; count: those made ready.
@@ -210,7 +222,8 @@ class CompiledTicks:
         """Make ready for at most `most` ticks; return for how many."""
         control, plant = self._flight.control, self._flight.plant
         if self._compiled_plant:
-            most = min(most, plant.draw_noise())
+            most = min(most, plant.physics.draw_noise())
+        most = int(min(most, plant.unchanged_for()))
         most = min(most, self._flight.autopilot.network.draw())
         left = control.bridge.reports.next - control.signals.stamp
         to_report = max(1, -(-left // control.mission.period))

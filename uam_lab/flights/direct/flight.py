@@ -79,7 +79,8 @@ class DirectFlight:
             odometry=OdometryDrift.NAME in vehicle.numbers["effects"],
         )
         if self._faults:
-            self.control.insert("bridge", "faults", self._update_faults, decides=False)
+            more = {"step": self._faults.step, "decides": False}
+            self.control.insert("bridge", "faults", self._update_faults, **more)
         if self._faults and self._faults.link.timeline.all:
             self.autopilot.passes = self._faults.link.passes
             self.autopilot.receives = self._faults.link.receives
@@ -170,7 +171,7 @@ class DirectFlight:
 
     def resume(self) -> None:
         """Go on after compiled ticks that have sensed last."""
-        samples = self.plant.arrived()
+        samples = self.plant.physics.arrived()
         self.newest = samples.hil
         self._deliver(samples, samples.imu)
 
