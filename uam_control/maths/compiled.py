@@ -31,7 +31,7 @@ F = TypeVar("F", bound=Callable)
 
 # an option of numba for its own use; without it, no function borrows: see `counts_references`
 _COUNTS = "_nrt" if hasattr(DefaultOptions, "_nrt") else ""
-_IN_C: list[object] = []  # owners of the machine code of `address_in_c`
+_CALLED_BY_ADDRESS: list[object] = []  # owners of the machine code of `address_of`
 
 
 def active() -> bool:
@@ -64,18 +64,21 @@ def _compiled(function: F, counting: bool) -> F:
     return compiled
 
 
-def address_in_c(function: Callable[[int], int]) -> int:
-    """Return the address of a function of one address, compiled as by `borrowing`, in C's form.
+def address_of(function: Callable[[int], int]) -> int:
+    """Return the address of a function of one address, compiled as by `borrowing`: for `hooks`.
 
     It is valid until the process ends.
     """
-    made = numba.njit(**_counting(False))(function)
-    made._cache = CompileCache(function)
-    signature = (numba.types.intp,)
+    made, signature = borrowing(function), (numba.types.intp,)
     made.compile(signature)
     code = made.overloads[signature]
-    _IN_C.append(made)
-    return code.library.get_pointer_to_function(code.fndesc.llvm_cfunc_wrapper_name)
+    _CALLED_BY_ADDRESS.append(made)
+    return code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
+
+
+def on_disk(function: Callable) -> bool:
+    """Return whether `function` has machine code on disk; an inlined one needs none."""
+    return getattr(getattr(function, "_cache", None), "filled", True)
 
 
 def inlined(function: F) -> F:

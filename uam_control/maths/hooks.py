@@ -19,26 +19,41 @@ from uam_control.maths.kept_tuple import KeptTuple
 if compiled.numba is not None:
     from llvmlite import ir
     from numba import types
+    from numba.core import cgutils
     from numba.extending import intrinsic
 
     @intrinsic
-    def _call(typing: Any, function: types.Type, data: types.Type) -> tuple:
+    def call(typing: Any, function: types.Type, data: types.Type) -> tuple:
+        """Call the hook `function` with `data`; return what it returns, raise what it raises."""
+
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            word = ir.IntType(64)
-            of = ir.FunctionType(word, [word]).as_pointer()
-            return builder.call(builder.inttoptr(arguments[0], of), [arguments[1]])
+            convention, takes = context.call_conv, (types.intp,)
+            of = convention.get_function_type(types.intp, takes).as_pointer()
+            at = builder.inttoptr(arguments[0], of)
+            status, found = convention.call_function(builder, at, types.intp, takes, arguments[1:])
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return found
 
         return types.intp(types.intp, types.intp), code
 
+    @intrinsic
+    def _call_c(typing: Any, function: types.Type) -> tuple:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            of = ir.FunctionType(ir.IntType(64), []).as_pointer()
+            return builder.call(builder.inttoptr(arguments[0], of), [])
 
-_IN_C = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
+        return types.intp(types.intp), code
+
+
+_IN_C = ctypes.CFUNCTYPE(ctypes.c_int64)
 _plain: list[Callable[[], object]] = []  # without numba: the functions by number
 
 if not compiled.active():
 
-    def _call(function: int, data: int) -> int:
-        _plain[function]()
-        return 0
+    def call(function: int, data: int) -> int:
+        """Call the hook `function`; return what it returns."""
+        return _plain[function]()
 
 
 class Hook(NamedTuple):
@@ -50,24 +65,19 @@ class Hook(NamedTuple):
 
 
 def compiled_hook(function: Callable[[tuple], int], arrays: tuple) -> Hook:
-    """Return the hook of a function under `compiled.borrowing`, which returns 0, on `arrays`."""
+    """Return the hook of a function under `compiled.borrowing` on `arrays`."""
     if not compiled.active():
         return _plain_hook(lambda: function(arrays))
     kept = KeptTuple(arrays)
     return Hook(_address(function, kept.read), kept.address, kept)
 
 
-def python_hook(function: Callable[[], object]) -> Hook:
+def python_hook(function: Callable[[], int]) -> Hook:
     """Return the hook of a function of Python; it must not raise."""
     if not compiled.active():
         return _plain_hook(function)
-
-    def call(data: int) -> int:
-        function()
-        return 0
-
-    made = _IN_C(call)
-    return Hook(ctypes.cast(made, ctypes.c_void_p).value, 0, made)
+    made = _IN_C(function)
+    return Hook(_python(), ctypes.cast(made, ctypes.c_void_p).value, made)
 
 
 def _plain_hook(function: Callable[[], object]) -> Hook:
@@ -77,17 +87,23 @@ def _plain_hook(function: Callable[[], object]) -> Hook:
 
 @cache
 def _address(function: Callable[[tuple], int], read: Callable[[int], tuple]) -> int:
-    """Return the address of the function in C's form that reads its tuple at an address."""
-    return compiled.address_in_c(lambda address: function(read(address)))
+    """Return the address of the function that reads the tuple of `function` at an address."""
+    return compiled.address_of(lambda address: function(read(address)))
+
+
+@cache
+def _python() -> int:
+    """Return the address of the function that calls one of C without arguments."""
+    return compiled.address_of(lambda address: _call_c(address))
 
 
 def table(hooks: Sequence[Hook]) -> np.ndarray:
-    """Return the hooks as an array (k, 2) for `call_all`."""
+    """Return the hooks as an array (k, 2) for `call`."""
     return np.array([hook[:2] for hook in hooks], dtype=np.int64).reshape(-1, 2)
 
 
 @compiled.borrowing
 def call_all(hooks: np.ndarray) -> None:
-    """Call the hooks of a `table` one after another."""
+    """Call the hooks of a `table` one after another; what they return does not count."""
     for i in range(len(hooks)):
-        _call(hooks[i, 0], hooks[i, 1])
+        call(hooks[i, 0], hooks[i, 1])

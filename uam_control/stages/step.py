@@ -1,4 +1,4 @@
-"""A stage of the tick: its function in Python, its compiled step, and loops over compiled steps.
+"""A stage of the tick: its function in Python, its compiled step, and a loop over stages.
 
 A compiled step does the same on the same memory. Where something is to be decided it changes
 nothing and says so; then the function in Python does the stage.
@@ -7,13 +7,13 @@ nothing and says so; then the function in Python does the stage.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import active, borrowing, inlined, prepared
-from uam_control.maths.kept_tuple import KeptTuple, calling
+from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.hooks import Hook, call, compiled_hook, python_hook, table
 
 # what a compiled step says. DECIDE: it has changed nothing; ENDED: the tick has no state; ASK: it
 # is done, and the next stage comes after a question to the objects
@@ -40,95 +40,61 @@ class Stage(NamedTuple):
 
 
 class Steps:
-    """Compiled steps in a row. `calls`: each of them, None where there is none."""
+    """A loop over parts of a tick: compiled steps, and functions in Python that say one of OUTCOMES
+    and do not raise."""
 
-    def __init__(self, steps: Sequence[Step | None], last: Step) -> None:
-        """last: is asked after the last one whether further ticks may follow, DONE."""
-        self._kept = [step and KeptTuple(step.arrays) for step in (*steps, last)]
-        self._functions = [
-            step and calling(step.function, kept.read, 0)
-            for step, kept in zip((*steps, last), self._kept, strict=True)
-        ]
-        self.calls = [
-            step and partial(prepared(step, 0), kept.address)
-            for step, kept in zip(self._functions, self._kept, strict=True)
-        ]
+    def __init__(
+        self, parts: Sequence[Step | Callable[[], int]], begin: int, last: Step | Callable[[], int]
+    ) -> None:
+        """begin: number of the first part of the second half of a tick; last: is asked after each
+        tick whether further ones may follow, DONE."""
+        self._kept = [_hook(part) for part in (*parts, last)]
+        hooks = table(self._kept)
+        halves = hooks[:begin], hooks[begin:-1], hooks[-1]
+        self._loop = partial(prepared(loop, *halves, 0, True), *halves)
 
-    @property
-    def whole(self) -> bool:
-        """Whether every step is compiled."""
-        return None not in self._functions
+    def __call__(self, count: int, whole: bool) -> tuple[int, int]:
+        """Begin up to `count` ticks and end them; not whole: the first one with its second half.
 
-    def loop(self, begin: int) -> tuple[Callable[[int, bool], tuple[int, int]], bool]:
-        """Return the loop over all steps, see `looped`, and whether it is compiled already; begin:
-        number of the first step of its second half."""
-        *steps, last = self._functions
-        addresses = np.array([kept.address for kept in self._kept])
-        loop = looped(_chain(steps[:begin]), _chain(steps[begin:]), last)
-        ready = not active() or loop._cache.filled
-        halves = addresses[:begin], addresses[begin:-1], addresses.item(-1)
-        return partial(prepared(loop, *halves, 0, True), *halves), ready
+        Returns the number of ticks that ended, and 0, or where the loop ended: the outcome of a
+        part that is not DONE + MANY for each part before it in its half, with a minus in the second
+        half.
+        """
+        return self._loop(count, whole)
 
 
-def _chain(steps: Sequence[Callable[[int], int]]) -> Callable:
-    rest = nothing
-    for step in reversed(steps):
-        rest = chained(step, rest)
-    return rest
+def _hook(part: Step | Callable[[], int]) -> Hook:
+    return compiled_hook(*part) if isinstance(part, Step) else python_hook(part)
 
 
-@inlined
-def nothing(addresses: np.ndarray, place: int) -> int:
-    """Do nothing."""
+@borrowing
+def chain(hooks: np.ndarray) -> int:
+    """Do parts one after another; return 0, or where they ended, see `Steps`."""
+    for i in range(len(hooks)):
+        outcome = call(hooks[i, 0], hooks[i, 1])
+        if outcome != DONE:
+            return outcome + MANY * i
     return 0
 
 
-@cache
-def chained(first: Callable, rest: Callable) -> Callable:
-    """Return the function that calls `first` with the address at `place`, then `rest` likewise.
-
-    It returns 0, or the outcome of a step that is not DONE + MANY for each step before it.
-    """
-
-    @inlined
-    def both(addresses: np.ndarray, place: int) -> int:
-        outcome = first(addresses[place])
-        if outcome != DONE:
-            return outcome
-        later = rest(addresses, place + 1)
-        return later + MANY if later else 0
-
-    return both
-
-
-@cache
-def looped(first: Callable, second: Callable, last: Callable) -> Callable:
-    """Return the compiled loop over ticks of two halves, see `chained`; last: see `Steps`."""
-
-    @borrowing
-    def loop(
-        ahead: np.ndarray, behind: np.ndarray, question: int, count: int, whole: bool
-    ) -> tuple[int, int]:
-        """Begin up to `count` ticks and end them; not whole: the first one with its second half.
-
-        Returns the number of ticks that ended, and 0, or where the loop ended: as `chained`, with a
-        minus in the second half.
-        """
-        done = 0
-        while True:
-            if whole:
-                if count == 0:
-                    return done, 0
-                count -= 1
-                end = first(ahead, 0)
-                if end:
-                    return done, end
-            whole = True
-            end = second(behind, 0)
-            if end:
-                return done, -end
-            done += 1
-            if last(question) != DONE:
+@borrowing
+def loop(
+    ahead: np.ndarray, behind: np.ndarray, question: np.ndarray, count: int, whole: bool
+) -> tuple[int, int]:
+    """Do ticks of two halves; see `Steps`."""
+    done = 0
+    while True:
+        if whole:
+            if count == 0:
                 return done, 0
-
-    return loop
+            count -= 1
+            end = chain(ahead)
+            if end:
+                return done, end
+        whole = True
+        end = chain(behind)
+        if end:
+            return done, -end
+        done += 1
+        if call(question[0], question[1]) != DONE:
+            return done, 0

@@ -10,7 +10,7 @@ objects do this stage and the rest of the tick. So all decisions are made by the
 recording is the same bit for bit (tests/flights/test_compiled_ticks.py).
 
 A part of the tick without a compiled step (a fault, a law, an effect or a setpoint of
-somebody's own) splits the loop: Python goes from part to part, tick by tick.
+somebody's own) is a function in Python, which the loop calls in its turn.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from weakref import proxy
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, jit
+from uam_control.maths.compiled import borrowing, jit, on_disk
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import put
 from uam_control.stages.bridge_stage import BridgeStage, unreported
 from uam_control.stages.control_tick import ControlTick, take_report
@@ -137,26 +138,31 @@ class CompiledTicks:
             self._make()
 
     def _make(self) -> None:
-        """Make the steps, and the loop over them."""
+        """Make the loop over the steps; where there is none, over the objects' functions."""
         flight, control = self._flight, self._flight.control
         names = [stage.name for stage in control.stages]
         self._mission = 1 + names.index("mission")
         stages = [stage.step(control) for stage in control.stages]
-        steps = [None if None in stages[: self._mission] else self._sensors(), *stages]
-        self._record = len(steps)
-        steps += [Step(record_step, (flight.recorder.arrays,)), self._cycle(), self._physics()]
-        self._steps = Steps(steps, Step(unreported, (control.bridge.arrays,)))
         left = zip(control.stages, stages, strict=True)
-        self._asks = any(stage.decides and step is None for stage, step in left)
+        asks = any(stage.decides and step is None for stage, step in left)
+        before = None if None in stages[: self._mission] else self._sensors()
+        around = before, self._cycle(), self._physics()
+        steps = [before, *stages, Step(record_step, (flight.recorder.arrays,)), *around[1:]]
+        self._sensed = before is not None
+        if not all(on_disk(step.function) for step in steps if step):
+            flight.say(COMPILES)
         runs = (partial(stage.run, control) for stage in control.stages)
         # not the methods themselves: they hold the flight, which holds this object
-        around = lambda: flight.sense(), lambda: flight.cycle(), lambda: flight.push()
-        self._in_python = [around[0], *runs, None, *around[1:]]
-        self._loop, ready = None, True
-        if self._steps.whole:
-            self._loop, ready = self._steps.loop(self._record)
-        if not ready:
-            flight.say(COMPILES)
+        objects = lambda: flight.sense(), lambda: flight.cycle(), lambda: flight.push()
+        self._in_python = [objects[0], *runs, None, *objects[1:]]
+        me = proxy(self)
+        parts = [
+            step or (lambda place=place: me._in_turn(place)) for place, step in enumerate(steps)
+        ]
+        last = Step(unreported, (control.bridge.arrays,))
+        asked = bound(*last)
+        question = (lambda: me._nominal_after(asked())) if asks else last
+        self._steps = Steps(parts, 1 + len(stages), question)
 
     @property
     def _compiled_plant(self) -> bool:
@@ -246,9 +252,9 @@ class CompiledTicks:
         flight.recorder.resume(control.signals.phase)
 
     def _finish(self, end: int) -> None:
-        """Let the objects finish the tick of a loop that ended in `end`, see `step.looped`."""
+        """Let the objects finish the tick of a loop that ended in `end`, see `Steps`."""
         flight, place, outcome = self._flight, abs(end) // MANY, abs(end) % MANY
-        if self._steps.calls[0] is not None:
+        if self._sensed:
             flight.resume()
         if end > 0 and outcome == DECIDE:
             flight.go_on(place - 1)
@@ -264,41 +270,34 @@ class CompiledTicks:
         flight.push()
 
     def _run(self, count: int, whole: bool) -> tuple[int, int]:
-        """Fly up to `count` ticks, see `step.looped`."""
-        return (self._loop or self._split)(count, whole)
+        """Fly up to `count` ticks, see `Steps`. Raises what a part in Python raises."""
+        self._error = None
+        done, end = self._steps(count, whole)
+        if self._error is not None:
+            raise self._error
+        return done, end
 
-    def _split(self, count: int, whole: bool) -> tuple[int, int]:
-        """Fly as the compiled loop does, from part to part; see `step.looped`."""
-        done = 0
-        while count > 0 or not whole:
-            if whole and done and self._asks and not self._nominal():
-                break
-            count -= whole
-            end = self._half(0, self._record) if whole else 0
-            if end:
-                return done, end
-            end = self._half(self._record, len(self._in_python))
-            if end:
-                return done, -end
-            whole, done = True, done + 1
-            if self._steps.calls[-1]() != DONE:
-                break
-        return done, 0
+    def _in_turn(self, place: int) -> int:
+        """Do a part in Python; say its outcome."""
+        try:
+            return self._do(place)
+        except BaseException as error:  # from here it could not come out of the loop
+            self._error = error
+            return ENDED
 
-    def _half(self, begin: int, end: int) -> int:
-        """Do the parts from `begin` to `end`; return 0, or where it ended, see `step.chained`."""
-        for place in range(begin, end):
-            call = self._steps.calls[place]
-            outcome = call() if call is not None else self._do(place)
-            if outcome != DONE:
-                return outcome + MANY * (place - begin)
-        return 0
+    def _nominal_after(self, outcome: int) -> int:
+        """Say whether further ticks may follow, after a part in Python that may decide."""
+        try:
+            return outcome if outcome != DONE or self._nominal() else ASK
+        except BaseException as error:
+            self._error = error
+            return ENDED
 
     def _do(self, place: int) -> int:
-        """Do a part in Python."""
         control = self._flight.control
-        self._take_report()
-        control.signals.setpoint = control.bridge.kept
+        if 0 < place < len(self._in_python) - 1:  # the plant needs neither
+            self._take_report()
+            control.signals.setpoint = control.bridge.kept
         goes_on = self._in_python[place]()
         if place == 0:
             self._sample[:] = self._flight.newest[1:]

@@ -20,7 +20,7 @@ from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
-from uam_control.maths.compiled import active
+from uam_control.maths.compiled import active, on_disk
 from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
@@ -59,7 +59,7 @@ def compiled_functions() -> Iterator:
 def is_cold() -> bool:
     """Return whether a function of the control path is not compiled from its present source."""
     return not all(
-        _filled(function)
+        on_disk(function)
         for function in compiled_functions()
         if function.py_func.__module__ != DIRECT  # see `prepare_direct`
     )
@@ -92,7 +92,7 @@ def prepare_direct(
     for law in laws:
         made = (make(LAWS[law].step) for make in (position_step, attitude_step, arm_step))
         direct = (one for one in compiled_functions() if one.py_func.__module__ == DIRECT)
-        if active() and not all(map(_filled, (*made, *direct, sending(STEPS)))):
+        if active() and not all(map(on_disk, (*made, *direct, sending(STEPS)))):
             _fly_direct(law, say)
 
 
@@ -103,11 +103,6 @@ def _fly_direct(law: str, say: Callable[[str], None]) -> None:
     flight.say = say
     while flight.plant.tick < TICKS:
         flight.advance(TICKS, TICKS)
-
-
-def _filled(function: Callable) -> bool:
-    """Return whether a function has machine code on disk; one that is inlined never has."""
-    return getattr(function._cache, "filled", True)
 
 
 def warm_up(laws: Iterable[str]) -> None:

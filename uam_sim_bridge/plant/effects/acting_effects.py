@@ -98,14 +98,15 @@ class ActingEffects:
         else:
             bench.pose[:] = changed[0], *changed[1], *changed[2]
 
-    def _safe(self, function: Callable[[], None]) -> Callable[[], None]:
+    def _safe(self, function: Callable[[], None]) -> Callable[[], int]:
         """Return the function without its errors: compiled code that calls it cannot pass them."""
 
-        def safe() -> None:
+        def safe() -> int:
             try:
                 function()
             except Exception as error:
                 self._errors.append(error)
+            return 0
 
         return safe
 
