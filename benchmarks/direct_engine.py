@@ -25,7 +25,7 @@ import mujoco
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flights.direct.flight import DirectFlight
-from uam_lab.flights.direct.warm_up import prepare_direct
+from uam_lab.flights.direct.warm_up import prepare
 from uam_sim_bridge.plant import Vehicle
 
 STRETCH = 250  # ticks
@@ -164,7 +164,7 @@ def main() -> None:
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    prepare_direct(print)
+    prepare(print)
     flown, physics, simulated, _ = min(measure() for _ in range(options.runs))
     print(f"flight          {flown:.2f} s for {simulated:.1f} s, {simulated / flown:.0f} x real")
     print(f"bare mj_step    {physics:.2f} s, {simulated / physics:.0f} x real")

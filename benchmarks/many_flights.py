@@ -33,7 +33,7 @@ from uam_lab.experiments.campaign.variations import Draws, ranges
 from uam_lab.experiments.trials.trial import measure
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
-from uam_lab.flights.direct.warm_up import prepare_direct
+from uam_lab.flights.direct.warm_up import prepare
 
 BLOCKS = 4  # turns of loop and worker, so that both see the same machine
 WORKER = "dask worker"  # title of a worker process
@@ -44,9 +44,9 @@ def overhead(options) -> int:
     """Print the time of a flight in a loop, that by a worker, and their ratio."""
     draws = Draws(load_profile("s500"), options.flights, 1, ranges(), options.scenario)
     trials = list(draws)
-    prepare_direct()
+    prepare()
     begun = time.perf_counter()
-    with workers(Workplace(1), prepare_direct) as crew:
+    with workers(Workplace(1), prepare) as crew:
         list(crew.completed(measure, trials[:1]))
         measure(trials[0])
         started = time.perf_counter() - begun

@@ -19,7 +19,7 @@ from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, measure
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
-from uam_lab.flights.direct.warm_up import prepare_direct
+from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.records.results import row_table
 from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.terminal import say
@@ -99,8 +99,8 @@ def _flown_by_workers(
             yield _Errand(work, trial)
 
     if not place.scheduler:
-        prepare_direct()  # here once, not in every worker
-    with workers(place, prepare_direct, partial(print, flush=True)) as crew:
+        prepare()  # here once, not in every worker
+    with workers(place, prepare, partial(print, flush=True)) as crew:
         for k, (result, content) in crew.completed(_run, errands()):
             number = numbers[k]
             if number in keep:

@@ -28,7 +28,7 @@ from uam_lab.experiments.tuning.space import Space, TuningError
 from uam_lab.experiments.workers.identity import difference
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
-from uam_lab.flights.direct.warm_up import prepare_direct
+from uam_lab.flights.direct.warm_up import prepare
 
 STEP = 0.1  # initial step of CMA-ES around the start, as a fraction of the logarithmic range
 HOPELESS = 1.5  # a candidate is pruned when its cost exceeds this factor times the best cost
@@ -202,8 +202,8 @@ def search(
         progress(_done(study), _progress(study))
 
     if not finished(study, task):
-        prepare_direct()
-        with workers(place, prepare_direct, partial(print, flush=True)) as crew:
+        prepare()
+        with workers(place, prepare, partial(print, flush=True)) as crew:
             for _ in crew.completed(work, tasks, per_worker=1, idle=show):
                 show()
     show()

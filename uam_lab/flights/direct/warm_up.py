@@ -20,7 +20,7 @@ from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
-from uam_control.maths.compiled import active, on_disk
+from uam_control.maths.compiled import on_disk
 from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
@@ -40,9 +40,8 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
-DIRECT = "uam_lab.flights.direct.compiled_ticks"  # functions that only a calm direct flight calls
 FURTHER = [law for law in LAWS if law != catalogue.DEFAULT]
-BESIDE = "--beside"  # as an option of this module as a program; other words are names of laws
+BESIDE = "--beside"  # as an option of this module as a program
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
@@ -58,11 +57,9 @@ def compiled_functions() -> Iterator:
 
 def is_cold() -> bool:
     """Return whether a function of the control path is not compiled from its present source."""
-    return not all(
-        on_disk(function)
-        for function in compiled_functions()
-        if function.py_func.__module__ != DIRECT  # see `prepare_direct`
-    )
+    law = LAWS[catalogue.DEFAULT].step
+    made = (make(law) for make in (position_step, attitude_step, arm_step))
+    return not all(map(on_disk, (*compiled_functions(), *made, sending(STEPS))))
 
 
 def prepare(say: Callable[[str], None] = lambda text: None) -> None:
@@ -84,29 +81,9 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
             warm_up(FURTHER)
 
 
-def prepare_direct(
-    say: Callable[[str], None] = lambda text: None, laws: Iterable[str] = (catalogue.DEFAULT,)
-) -> None:
-    """Do what `prepare` does, and compile the ticks of the direct engine with `laws`."""
-    prepare(say)
-    for law in laws:
-        made = (make(LAWS[law].step) for make in (position_step, attitude_step, arm_step))
-        direct = (one for one in compiled_functions() if one.py_func.__module__ == DIRECT)
-        if active() and not all(map(on_disk, (*made, *direct, sending(STEPS)))):
-            _fly_direct(law, say)
-
-
-def _fly_direct(law: str, say: Callable[[str], None]) -> None:
-    """Fly a few seconds in compiled ticks."""
-    hover, vehicle = load_scenario("hover"), Vehicle.load()
-    flight = DirectFlight(hover, default_profile(law), vehicle, 0.0, seed=1)
-    flight.say = say
-    while flight.plant.tick < TICKS:
-        flight.advance(TICKS, TICKS)
-
-
 def warm_up(laws: Iterable[str]) -> None:
-    """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
+    """Fly a few seconds in the direct engine with each law: it runs every function of the nodes,
+    with the default law the compiled ticks, too."""
     for law in laws:
         flight = _flight(law)
         for _ in range(TICKS):
@@ -156,6 +133,3 @@ if __name__ == "__main__":
         warm_up(FURTHER)
     else:
         prepare(print)
-        for name in [law for law in LAWS if law in sys.argv] or [catalogue.DEFAULT]:
-            if active():
-                _fly_direct(name, print)

@@ -19,7 +19,7 @@ from uam_control.supervision import State
 from uam_control.supervision.preflight import UNKNOWN
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import conclude
-from uam_lab.flights.direct.warm_up import prepare, prepare_direct
+from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
 from uam_lab.flights.library.errors import CommandRefused, FlightEnded, FlightError, NotInTime
 from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
@@ -99,8 +99,7 @@ class Flight:
             flight_settings.require_ros()
         if self._engine is None:  # a vehicle's own engine waits for its devices
             flight_settings.require_device(self.settings.link)
-        make_ready = prepare if self.settings.engine == "ros" else prepare_direct
-        make_ready(self._history.message)
+        prepare(self._history.message)
         settings = self.settings
         self._folder = ResultFolder.create(
             settings.scenario.name, settings.controller, settings.out
