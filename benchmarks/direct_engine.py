@@ -3,6 +3,7 @@
     .venv/bin/python benchmarks/direct_engine.py
     .venv/bin/python benchmarks/direct_engine.py --runs 1 --picture docs/images/direct_engine.svg
     .venv/bin/python benchmarks/direct_engine.py --profile    # the slowest functions, too
+    .venv/bin/python benchmarks/direct_engine.py --plant-preset laboratory --fault imu_bias@15+20
 
 Alternates a part of the flight with the same number of `mj_step` of the same model, so that both
 run under the same load. Prints the real-time factor, the ratio, and a table: where the time goes,
@@ -16,9 +17,9 @@ import cProfile
 import os
 import pstats
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 
@@ -26,7 +27,9 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.direct.warm_up import prepare
+from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 STRETCH = 250  # ticks
 PHYSICS, REST = "bare mj_step", "between the parts"
@@ -35,23 +38,33 @@ ASKED, READY, BACK = "whether something is to be decided", "path ahead", "back t
 GRASP = "executive of the grasps"
 
 
-def new_flight() -> DirectFlight:
-    """Return a flight of the paper's mission."""
-    return DirectFlight(
-        load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2, seed=1
-    )
+class Flown(NamedTuple):
+    """What flies the paper's mission: presets of the plant, faults as of `uam fly --fault`."""
+
+    presets: Sequence[str]
+    faults: Sequence[str]
+
+    def flight(self, faulty: bool = True) -> DirectFlight:
+        """Return a flight; faulty: with the faults."""
+        scenario, vehicle = load_scenario("pick_and_place"), Vehicle.load()
+        vehicle = vehicle.changed({"effects": presets.read(self.presets)})
+        faults = read_schedule(self.faults if faulty else (), scenario, seed=1)
+        flown = scenario, load_profile("s500"), vehicle, 0.2
+        return DirectFlight(*flown, seed=1, faults=faults)
 
 
-def measure(watch: Callable[[DirectFlight], None] = lambda flight: None) -> tuple[float, ...]:
+def measure(
+    flown: Flown, watch: Callable[[DirectFlight], None] = lambda flight: None
+) -> tuple[float, ...]:
     """Return time of a flight, time of its physics [s], simulated time [s], ticks.
 
     watch: prepares the flight.
     """
-    flight, bare = new_flight(), new_flight()
+    flight, bare = flown.flight(), flown.flight(faulty=False)
     watch(flight)
     model, data = bare.plant.model, bare.plant.data
     steps = round(bare.plant.period / model.opt.timestep)
-    flown = physics = 0.0
+    time_flown = physics = 0.0
     while not flight.mission.output.done:
         before, begun = time.process_time(), flight.plant.tick
         while flight.plant.tick < begun + STRETCH and not flight.mission.output.done:
@@ -59,9 +72,9 @@ def measure(watch: Callable[[DirectFlight], None] = lambda flight: None) -> tupl
         between = time.process_time()
         for _ in range((flight.plant.tick - begun) * steps):
             mujoco.mj_step(model, data)
-        flown += between - before
+        time_flown += between - before
         physics += time.process_time() - between
-    return flown, physics, flight.plant.time, flight.plant.tick
+    return time_flown, physics, flight.plant.time, flight.plant.tick
 
 
 class Watch:
@@ -117,11 +130,11 @@ class Watch:
         return found | {REST: flown - watched}
 
 
-def parts() -> dict[str, float]:
+def parts(flown: Flown) -> dict[str, float]:
     """Return where the time goes [us per tick], the longest first."""
     watch = Watch()
-    flown, physics, _, ticks = measure(watch)
-    times = watch.of_the_flight(flown)
+    whole, physics, _, ticks = measure(flown, watch)
+    times = watch.of_the_flight(whole)
     share = watch.compiled.ticks / ticks
     times[LOOP] -= share * physics
     times[OBJECTS] -= (1.0 - share) * physics
@@ -161,20 +174,23 @@ def main() -> None:
     parser.add_argument("--profile", action="store_true", help="list the slowest functions")
     parser.add_argument("--picture", type=Path, help="file for a picture of the parts")
     parser.add_argument("--runs", type=int, default=5, help="runs; the best counts (default 5)")
+    parser.add_argument("--plant-preset", nargs="*", default=[], help="effects of the plant")
+    parser.add_argument("--fault", nargs="*", default=[], help="faults, as of uam fly")
     options = parser.parse_args()
+    mission = Flown(options.plant_preset, options.fault)
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     prepare(print)
-    flown, physics, simulated, _ = min(measure() for _ in range(options.runs))
+    flown, physics, simulated, _ = min(measure(mission) for _ in range(options.runs))
     print(f"flight          {flown:.2f} s for {simulated:.1f} s, {simulated / flown:.0f} x real")
     print(f"bare mj_step    {physics:.2f} s, {simulated / physics:.0f} x real")
     print(f"ratio           {flown / physics:.2f}\n")
-    found = parts()
+    found = parts(mission)
     print(table(found))
     if options.picture:
         draw(found, flown / physics, options.picture)
     if options.profile:
-        flight, profile = new_flight(), cProfile.Profile()
+        flight, profile = mission.flight(), cProfile.Profile()
         profile.runcall(flight.run)
         pstats.Stats(profile).sort_stats("tottime").print_stats(25)
 
