@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import BatteryState, Temperature
-from std_msgs.msg import Header
+from std_msgs.msg import Float64, Header
 from vehicle_rig import PERIOD, Vehicle, take_off
 
 from uam_control.coordinates import coordinates
@@ -170,3 +170,26 @@ def test_a_required_checklist_refuses_the_start_until_it_has_passed(start, probe
     report(passed=True)
     assert not read_reference(vehicle.references[-1])[1].flying
     assert vehicle.ask("start") == (True, "arming")
+
+
+def test_openings_of_a_gripper_close_open_or_are_refused(start, probe):
+    """Its stroke is 20 to 75 mm; the plant takes an opening in between by the same rule."""
+    arguments = "-p", "scenario:=hover", "-p", "vehicle:=s500_gripper"
+    node = start("uam_control.nodes.mission", "--ros-args", *arguments)
+    vehicle = Vehicle(probe)
+    vehicle.node = node
+    vehicle.fly(1)
+    pad = probe.publisher(topics.GRIPPER_COMMAND)
+    probe.until(lambda: pad.get_subscription_count(), "a subscription")
+    for opening, answer, closed in (
+        (0.02, "closes", True),
+        (0.045, "opens", False),
+        (0.02, "closes", True),
+        (0.08, "refused: opening 0.08 is outside 0.02 to 0.075", True),
+    ):
+        pad.publish(Float64(data=opening))
+        node.until_logged(f"gripper {opening:g}: {answer}")
+        count = len(vehicle.magnet)
+        vehicle.fly(3)
+        probe.until(lambda count=count: len(vehicle.magnet) > count + 1, "the switch")
+        assert vehicle.magnet[-1].data == closed
