@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/numbers_of_docs.py                    # `make numbers`: half an hour
     .venv/bin/python benchmarks/numbers_of_docs.py --only short       # what CI runs
     .venv/bin/python benchmarks/numbers_of_docs.py --only slow        # the rest, hours
-    .venv/bin/python benchmarks/numbers_of_docs.py docs/margins.md    # of some pages
+    .venv/bin/python benchmarks/numbers_of_docs.py docs/tuning.md    # of some pages
     .venv/bin/python benchmarks/numbers_of_docs.py --update           # write what moved
 
 A mark names the command that made the tables after it, up to the next mark or heading:

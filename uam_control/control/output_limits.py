@@ -232,7 +232,7 @@ def lead_attitude(
 
     The desired body rates of roll and pitch move with their feedforward, e_q with its rate. The
     measured body rates stay: they cancel in the setpoint. Yaw stays as it is: the rotors' weak
-    moment about yaw leaves no room for more gain on its rate (docs/margins.md).
+    moment about yaw leaves no room for more gain on its rate (docs/tuning.md).
     """
     for i in range(ROLL, YAW):
         errors[E, i] += ahead * errors[E_DOT, i]

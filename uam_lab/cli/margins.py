@@ -27,7 +27,7 @@ examples:
   uam margins --flight results/latest      adapted gains of a flight (default: one is flown)
   uam margins --initial                    only the initial gains; no flight
 
-The model is linear, around hover; docs/margins.md. Results in --out: margins.md, margins.json,
+The model is linear, around hover; docs/tuning.md. Results in --out: margins.md, margins.json,
 bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong use.
 """
 
