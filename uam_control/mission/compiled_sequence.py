@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uam_control.mission.flight_sequence import FlightSequence
+from uam_control.mission.commanded_flight import CommandedFlight
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.nominal_tick import MissionArrays
 from uam_control.supervision import Authority, Guide, State
@@ -14,7 +14,7 @@ from uam_control.supervision import Authority, Guide, State
 FOLLOWS = (State.TAKING_OFF, State.FLYING, State.LANDING)  # states that follow the scenario
 
 
-class Mission(FlightSequence):
+class Mission(CommandedFlight):
     """The sequence; while it only follows its scenario, compiled functions step it.
 
     `arrays`: what they use, None before a flight.

@@ -27,13 +27,11 @@ from uam_control.mission.mission_output import (
     MissionOutput,
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
-from uam_control.mission.motion.braking import leaves_geofence
 from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.nominal_tick import REAL, WHOLE
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.permission import ChecklistReport
-from uam_control.mission.plan_limits import check
-from uam_control.mission.plans import Goal, PlanRefused
+from uam_control.mission.plans import Goal
 from uam_control.mission.pre_arm import PreArm
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
@@ -52,7 +50,7 @@ from uam_control.supervision import (
     StateTransition,
     Supervisor,
 )
-from uam_control.vehicle import NO_GRIPPER, TWO_FINGER, VehicleDescription, closes
+from uam_control.vehicle import VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
 # landings after a hold that nobody asked for here: not where a stand is
@@ -129,27 +127,6 @@ class FlightSequence:
         self.scenario = scenario
         self._phases = Steps(scenario.phase, (at for at, _ in scenario.phases))
         self._magnet = Steps(scenario.magnet_on, (at for at, _ in scenario.magnet))
-
-    def start(self) -> tuple[bool, str]:
-        """Desire an armed autopilot from the next step on; the take-off follows.
-
-        After the end of a flight it begins the next one. Returns whether it is accepted, and the
-        reason of a refusal in one line.
-        """
-        output, seen = self.output, self._seen
-        if self._start.dry_run:
-            return False, "refused: dry run, nothing is armed"
-        if seen is None:
-            return False, "refused: no state of the vehicle yet"
-        if output.done and not seen.armed:
-            self._begin(self._parameters)
-            self._supervisor.step(self._stamp, seen)
-        if output.state is not State.GROUNDED or output.arm:
-            return False, f"refused: not while {output.state.value}"
-        if self.not_ready:
-            return False, f"refused: {self.not_ready}"
-        self._supervisor.start()
-        return True, "arming"
 
     def begin_anew(self) -> None:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
@@ -287,105 +264,6 @@ class FlightSequence:
     def lose_states(self, cause: str) -> None:
         """Hand over to the autopilot's failsafe: states have stopped in flight."""
         self._follow(self._stamp, self._supervisor.lose_states(cause))
-
-    def request(self, command: OperatorCommand) -> tuple[bool, str]:
-        """Queue a command for the next step.
-
-        Returns whether it is accepted, and the command or the reason of the refusal in one line.
-        """
-        if self._seen is None:
-            return False, "no state of the vehicle yet"
-        refusal = self._supervisor.refusal(command, self._seen)
-        if not refusal and command is OperatorCommand.RESUME:
-            refusal = self._stops_outside()
-        if refusal:
-            return False, f"refused: {refusal}"
-        self._requests.append((command, None))
-        return True, command.value.value
-
-    def _stops_outside(self) -> str:
-        """Say by how much a released vehicle would leave the geofence before it stops; "" if not.
-
-        Control stays with the pilot then: taken over there, the vehicle would only land.
-        """
-        state = self._seen.state
-        if self.output.state is not State.RELEASED or not np.all(np.isfinite(state[CHI])):
-            return ""
-        return leaves_geofence(self._stamp, state, self._parameters, self._ground)
-
-    def plan(self, goal: Goal) -> tuple[bool, str]:
-        """Check a goal or trajectory; queue it for the next step if it can be flown.
-
-        It replaces the path or the plan before it. At its end the mission holds until a command.
-        A goal equal to the one that is flown or reached changes nothing. Returns whether it is
-        accepted, and the length of the plan or the reason of the refusal.
-        """
-        if self._seen is None:
-            return False, "refused: no state of the vehicle yet"
-        refusal = self._supervisor.refusal(OperatorCommand.GOAL, self._seen)
-        if refusal:
-            return False, f"refused: {refusal}"
-        parameters, motion = self._parameters, self._guidance.motion
-        moves = self._guidance.planned and not self._guidance.arrived(self._stamp)
-        if goal.still and not moves:
-            return True, "accepted: nothing to stop"
-        made = self._guidance.on_way_to(goal, self._stamp)
-        if made is None:
-            try:
-                goal = goal.solved(motion, parameters, self._ground)
-                goal.check(motion, parameters)
-                made = goal.plan(self._stamp, motion, parameters)
-                for part in made.parts:
-                    check(part, parameters, self._ground)
-            except PlanRefused as error:
-                hint = " (on a fast path: /mission/hold first)" if self._guidance.fast else ""
-                return False, f"refused: {error}{hint}"
-            self._ask_for(goal)
-        return True, f"accepted: {goal.note}at the end in {max(0.0, made.end - self._stamp):.1f} s"
-
-    def _ask_for(self, goal: Goal) -> None:
-        """Queue a goal for the next step, in place of one that waits for it."""
-        columns = goal.columns
-        waiting = (one for one in self._requests if one[1] is None or one[1].columns != columns)
-        self._requests = deque([*waiting, (OperatorCommand.GOAL, goal)])
-
-    def preview(self, step: float, longest: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return stamps (m,) [s] and planned chi (m, 6 + n), every `step` [s]; m = 0 on the ground.
-
-        longest [s]: of the part that is returned.
-
-        Nothing is planned in failsafe or while somebody else has control.
-        """
-        idle = self.output.state in (State.FAILSAFE, State.DISARMED, State.RELEASED)
-        if self._guidance is None or idle:
-            return np.zeros(0), np.zeros((0, self.output.reference.shape[1]))
-        return self._guidance.preview(self._stamp, step, longest)
-
-    def switch_magnet(self, on: bool) -> tuple[bool, str]:
-        """Override the magnet until the scenario switches it next; returns as `request` does."""
-        if self.output.state is State.DISARMED:
-            return False, "refused: not while disarmed"
-        self._override.give(on, self._scenario_magnet())
-        return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
-
-    def command_gripper(self, opening: float) -> tuple[bool, str]:
-        """Close or open the gripper as `switch_magnet` does; opening [m], 0 or 1 of a magnet."""
-        p = self._parameters
-        if p.gripper == NO_GRIPPER:
-            return False, "refused: the vehicle has no gripper"
-        if (close := closes(opening, p.gripper_opening)) is None:
-            closed, opened = p.gripper_opening
-            return False, f"refused: opening {opening:g} is outside {closed:g} to {opened:g}"
-        accepted, reason = self.switch_magnet(close)
-        done = f"{'closes' if close else 'opens'} until the scenario grips or opens next"
-        return accepted, done if accepted else reason
-
-    @property
-    def gripper_state(self) -> float:
-        """The measured opening [m]; of a magnet 1 on, 0 off; NaN: unknown."""
-        if self._parameters.gripper != TWO_FINGER:
-            return float(self.output.magnet)
-        return math.nan if self._seen is None else self._seen.readings.grip.item(0)
 
     def _wait(self, state: np.ndarray, armed: bool) -> None:
         """Start by itself if it may; in a dry run follow the pose of the first state (3, 6 + n).
