@@ -81,6 +81,10 @@ def test_the_shipped_duel_flies_every_row_in_every_task():
     duel = load_duel("fsc_lab", ("default", "MAC"))
     planned = list(trials(duel, 2))
     assert len(planned) == 2 * (7 * 2 + len(duel.delays))
+    # the supervisor would land before the law fails
+    assert all(
+        (one.profile.sets["mission"].delay_margin == 1.0) == bool(one.faults) for one in planned
+    )
     assert {one.label for one in planned} == {"default", "MAC"}
     assert all(one.vehicle_changes for one in planned)
 
