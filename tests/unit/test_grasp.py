@@ -14,6 +14,7 @@ from uam_control.grasp.evidence import Load, by_mass, by_pose, by_travel, identi
 from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.place_history import PlaceHistory
 from uam_control.grasp.sight import RunningMean
+from uam_control.grasp.thrust_reserve import expected_throttle
 from uam_control.mission import load_scenario
 from uam_control.vehicle import chain_of, load_description
 
@@ -182,6 +183,7 @@ class Flight:
         self.noise = lambda: np.zeros(3)
         self.error = np.zeros(3)
         self.gust = lambda time: 0.0  # [N]
+        self.throttle = lambda: 0.6
 
     def tool(self):
         return self.planned(self.time) + self.shift + self.error + self.noise()
@@ -218,6 +220,7 @@ class Flight:
                 error=self.error.copy(),
                 payload=payload.copy(),
                 lift=21.6 + load + self.gust(self.stamp),
+                throttle=self.throttle(),
                 effort=0.5 + 0.2 * load,
                 lever=0.2,
                 ahead=ahead,
@@ -414,4 +417,54 @@ def test_time_in_which_the_scenario_is_not_flown_does_not_count_as_waiting():
         flight.step()
     assert flight.executive.decisions == []
     flight.noise = lambda: np.zeros(3)
+    assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
+
+def test_the_thrust_with_a_payload_is_expected_from_its_weight():
+    """2 kg hover with 0.6; 0.4 kg more: 0.6 * 2.4 / 2."""
+    sight = Sight(0.0, 0.0, PLACE, lift=2.0 * 9.81, throttle=0.6)
+    assert expected_throttle(sight, 0.4) == pytest.approx(0.72)
+    assert math.isnan(expected_throttle(Sight(0.0, 0.0, PLACE, throttle=0.6), 0.4))
+
+
+def test_a_payload_that_is_too_heavy_for_the_thrust_is_not_picked():
+    """21.6 N with 0.84; 0.2 kg more: 0.84 (1 + 0.2 * 9.81 / 21.6) = 0.92 > 0.9."""
+    flight = Flight(lambda attempt: True)
+    flight.throttle = lambda: 0.84
+    assert flight.until() == [Grasp.GIVEN_UP]
+    assert flight.executive.decisions[-1].text == "given up, too heavy: thrust 0.92 with 0.2 kg"
+    assert flight.executive.directive.without_descent == flight.windows[0]
+    light = Flight(lambda attempt: True, mass=0.1)
+    light.throttle = lambda: 0.84  # 0.88
+    assert light.until()[-1] is Grasp.RELEASED
+
+
+@pytest.mark.parametrize("heavy_until", [37.6, 38.0])
+def test_a_payload_that_takes_all_thrust_is_set_down_on_its_stand(heavy_until):
+    """While it is lifted, or a moment later, at most 5 cm beside: 0.3 s of full thrust."""
+    flight = Flight(lambda attempt: True, offset=(0.015, -0.01))
+    flight.throttle = lambda: 1.0 if flight.carried and flight.time > heavy_until - 1.0 else 0.6
+    stood = flight.payload.copy()
+    assert flight.until()[-2:] == [Grasp.APPROACHED, Grasp.GIVEN_UP]
+    texts = [one.text for one in flight.executive.decisions]
+    assert texts[-2] == "too heavy, thrust 1.00: set down"
+    assert texts[-1].startswith("given up, too heavy")
+    assert flight.executive.decisions[-1].attempt == 1
+    assert np.hypot(*(flight.payload - stood)[:2]) < 0.005
+    assert not flight.executive.directive.land
+
+
+@pytest.mark.parametrize(("sunk", "lands"), [(0.07, False), (0.09, True)])
+def test_a_vehicle_that_sinks_on_its_way_lands_with_the_payload(sunk, lands):
+    flight = Flight(lambda attempt: True)
+    flight.until(60.0)
+    flight.throttle, flight.error = lambda: 0.95, np.array([0.0, 0.0, -sunk])
+    flight.until(61.0)
+    text = "too heavy, thrust 0.95: lands"
+    assert flight.executive.directive.land == (text if lands else "")
+    assert flight.executive.grasp is Grasp.HELD
+
+
+def test_a_moment_of_full_thrust_is_no_shortage():
+    flight = Flight(lambda attempt: True)
+    flight.throttle = lambda: 1.0 if flight.carried and flight.stamp % 1.0 < 0.29 else 0.6
     assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]

@@ -159,8 +159,8 @@ def test_messages_of_stages_are_read_as_those_of_other_processes():
         kept.keep("payload", kept.payload, (stamp, 2.0 * way, LEVEL))
         put.put(BIAS, stamp, 0.1 * way)
         kept.keep("bias", kept.inputs.accelerometer_bias, (now, 0.1 * way))
-        put.put(LIFT, stamp, (20.0 + now,))
-        kept.keep("lift", kept.inputs.lift, (20.0 + now,))
+        put.put(LIFT, stamp, (20.0 + now, 0.5 + now))
+        kept.keep("lift", kept.inputs.lift, (20.0 + now, 0.5 + now))
         for i, own in enumerate(names):
             given = gains[: len(own)]
             put.put(GAINS + i, stamp, given)

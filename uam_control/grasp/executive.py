@@ -30,6 +30,7 @@ from uam_control.grasp.evidence import (
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.grippers import GRIPPERS, GripperKind
 from uam_control.grasp.sight import Lasting, RunningMean, Sight
+from uam_control.grasp.thrust_reserve import ThrustReserve, expected_throttle
 from uam_control.grasp.windows import FROM_ABOVE, GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken
@@ -40,6 +41,7 @@ BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is
 CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
 LATE = 2.0  # after align_timeout: factor on the tolerances of the alignment, and on the timeout
 WEIGHED_FOR = 0.5  # [s] for which an identified mass alone must show the payload: no transient
+OVER = 0.05  # [m] horizontal distance from its stand within which it is set down on it
 CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a contact is over
 PERIOD, CARRY_PERIOD = 0.02, 0.1  # [s] between two steps; away from every stand
 
@@ -65,6 +67,8 @@ class GraspExecutive:
         self._start = np.zeros(3)  # tool at the begin of the descent
         self._gripped = np.full((2, 3), math.nan)  # tool and payload at the grip
         self._lasting, self._contact = Lasting(), Lasting()  # of a condition; of a contact
+        self._reserve, self._too_heavy = ThrustReserve(), False  # found out
+        self._shift_of_lift = np.zeros(3)  # of the path
         self.period = PERIOD  # [s] until the next step
         self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
             Step.APPROACH: self._approach,
@@ -111,6 +115,7 @@ class GraspExecutive:
             return self.directive
         self._since = min(self._since, sight.stamp)
         self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))
+        self._reserve.add(sight, self.parameters)
         self.period = PERIOD
         self._steps[self._step](sight, window)
         return self.directive
@@ -118,7 +123,7 @@ class GraspExecutive:
     def interrupt(self) -> None:
         """Forget running values and the time waited: the scenario is not flown now."""
         self._since = math.inf  # until the next step
-        for one in (self._alignment, self._load, self._lasting, self._contact):
+        for one in (self._alignment, self._load, self._lasting, self._contact, self._reserve):
             one.restart()
 
     def _go(self, step: Step, sight: Sight, pace: float = 1.0) -> None:
@@ -152,7 +157,7 @@ class GraspExecutive:
             alignment.restart()  # above the payload it is measured once more
             self._go(Step.ALIGN, sight, pace=0.0)
         elif alignment.good(p):
-            self._begin_descent(sight)
+            self._begin_descent(sight, window)
         else:
             self._go(Step.ALIGN, sight, pace=0.0)
 
@@ -165,7 +170,7 @@ class GraspExecutive:
             if alignment.settled():
                 self._leave_out(sight, window)
         elif alignment.good(p) or (late and alignment.good(p, LATE)):
-            self._begin_descent(sight)
+            self._begin_descent(sight, window)
         elif late and (alignment.known or self._waited(sight) >= LATE * p.align_timeout):
             self._attempt += 1
             seen = alignment.text if alignment.known else "payload seen at times only"
@@ -185,7 +190,12 @@ class GraspExecutive:
         text = f"absent, not within {self._reach:g} m of its place"
         self._leave(sight, window, Grasp.ABSENT, f"{text}; payload at {place(sight.payload)}")
 
-    def _begin_descent(self, sight: Sight) -> None:
+    def _begin_descent(self, sight: Sight, window: GraspWindow) -> None:
+        throttle = expected_throttle(sight, self._expected)
+        if throttle > self.parameters.pick_throttle:
+            text = f"given up, too heavy: thrust {throttle:.2f} with {self._expected:g} kg"
+            self._leave(sight, window, Grasp.GIVEN_UP, text)
+            return
         self._attempt += 1
         self._stood, self._start = sight.payload.copy(), sight.tool.copy()
         self._before = self._present_load()
@@ -202,7 +212,12 @@ class GraspExecutive:
             self.directive.grip = touches_beside(sight, self._grip_tolerance)
         if self._step is Step.DESCEND and sight.time >= window.grip:
             self._gripped[:] = sight.tool_then, sight.payload
+            self._shift_of_lift = self.directive.shift
             self._go(Step.LIFT, sight)
+
+    @property
+    def _carries(self) -> bool:
+        return self.grasp in (Grasp.HELD, Grasp.UNVERIFIED)
 
     @property
     def _gripper(self) -> GripperKind:
@@ -242,7 +257,9 @@ class GraspExecutive:
             return
         pose = against(by_travel(sight, *self._gripped, self.parameters), self._felt(sight))
         self.lifted = pose.held is True
-        if self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
+        if self._reserve.short:
+            self._set_down(sight)
+        elif self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
             self._go_back(sight, f"not held, {pose.text}")
         elif sight.time >= window.lifted:
             self._go(Step.VERIFY, sight)
@@ -252,6 +269,9 @@ class GraspExecutive:
         if self._touches(sight):  # held down: a payload that cannot be lifted
             error = _across(sight.error)
             self._go_back(sight, f"not lifted, position error {error:.2f} m")
+            return
+        if self._reserve.short:
+            self._set_down(sight)
             return
         evidence = self._evidence(sight)
         lasts = self._lasting(sight.stamp, bool(evidence.held))
@@ -274,6 +294,11 @@ class GraspExecutive:
         self._go(Step.CARRY, sight)
         self.directive.shift = np.zeros(3)
 
+    def _set_down(self, sight: Sight) -> None:
+        """Put the payload back on its stand, by the way on which it came."""
+        self._too_heavy, self.directive.shift = True, self._shift_of_lift
+        self._go_back(sight, f"too heavy, thrust {sight.throttle:.2f}: set down")
+
     def _go_back(self, sight: Sight, text: str) -> None:
         self._decide(sight, Grasp.APPROACHED, text)
         self._go(Step.RETREAT, sight, pace=-1.0)
@@ -286,7 +311,9 @@ class GraspExecutive:
         """Align once more, or leave the payload where it is."""
         p, reason = self.parameters, ""
         self._alignment.restart()
-        if sight.tracked and self._stood[2] - sight.payload[2] > FALLEN:
+        if self._too_heavy:
+            reason, self._too_heavy = "too heavy", False
+        elif sight.tracked and self._stood[2] - sight.payload[2] > FALLEN:
             reason = "fallen from its place"
         elif sight.tracked and np.hypot(*(sight.payload - self._start)[:2]) > FAR * self._reach:
             reason = "out of reach"
@@ -331,7 +358,7 @@ class GraspExecutive:
         lasts = self._lasting(sight.stamp, calm)
         if self._waited(sight) < p.align_timeout and lasts < CALM_FOR:
             return
-        if self.grasp in (Grasp.HELD, Grasp.UNVERIFIED):
+        if self._carries:
             self._go(Step.CARRY, sight)
         else:
             self._go(Step.RETREAT, sight, pace=-1.0)
@@ -341,7 +368,11 @@ class GraspExecutive:
         if sight.time >= window.release:
             self._go(Step.RELEASE, sight)
             return
-        beside = _across(sight.tool - self._start) < BESIDE
+        away = _across(sight.tool - self._start)
+        beside = away < BESIDE
+        if self._carries and self._reserve.short and away < OVER:
+            self._set_down(sight)
+            return
         if not beside and sight.time < window.release - CARRY_PERIOD:
             self.period = CARRY_PERIOD
         if beside and self._touches(sight):
@@ -349,8 +380,11 @@ class GraspExecutive:
             return
         if not beside and self.directive.shift.any():
             self.directive.shift = np.zeros(3)
-        if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
+        if not self._carries:
             return
+        if not beside and self._reserve.sinks(sight) and not self.directive.land:
+            self._decide(sight, self.grasp, f"too heavy, thrust {sight.throttle:.2f}: lands")
+            self.directive.land = self.decisions[-1].text
         evidence = against(by_pose(sight, p), self._felt(sight))  # not the mass: the arm moves
         if self._lasting(sight.stamp, evidence.held is False) >= p.lost_after:
             self._decide(sight, Grasp.LOST, f"lost in flight, {evidence.text}")
@@ -361,7 +395,7 @@ class GraspExecutive:
         p = self.parameters
         pose = by_pose(sight, p)
         gone = pose.held is False or self._gripper.let_go(sight, p)
-        if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
+        if not self._carries:
             self._end()
         elif gone:
             if sight.time >= window.departure or self.directive.pace == 0.0:

@@ -57,6 +57,14 @@ class GraspParameters(ChainParameters):
     held_mass: float = number(
         0.05, "identified mass above which a payload without mocap counts as held", "kg", 0.001, 5.0
     )
+    pick_throttle: float = number(
+        0.9, "thrust as sent, expected with the payload, above which it is not picked", "1",
+        0.1, 2.0,
+    )  # fmt: skip
+    carry_throttle: float = number(
+        0.92, "thrust as sent from which on a payload is too heavy: set down, or landed with", "1",
+        0.1, 2.0,
+    )  # fmt: skip
     lift_timeout: float = number(
         4.0, "longest wait for the evidence that the payload is lifted", "s", 0.0, 60.0
     )

@@ -20,9 +20,10 @@ class Sight:
     (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose;
     tool_then (3,) [m, world]: tool at the stamp of that pose, default: no delay; ahead (3,)
     [m]: way of the tool on the path from now until the descent begins; lift
-    [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
-    horizontal distance of the tool from that joint; on_path: whether the vehicle flies on the
-    path, and not on its way back to it. opening [m], squeeze [N]: of fingers. NaN: unknown.
+    [N]: filtered collective thrust; throttle: the same as sent, 0..1; effort [N m]: measured torque
+    of the first joint; lever [m]: horizontal distance of the tool from that joint; on_path: whether
+    the vehicle flies on the path, and not on its way back to it. opening [m], squeeze [N]: of
+    fingers. NaN: unknown.
 
     A payload that stands is compared with `tool`, its old pose is still true. One that may hang
     on the tool is compared with `tool_then`.
@@ -34,6 +35,7 @@ class Sight:
     error: np.ndarray = field(default_factory=lambda: np.zeros(3))
     payload: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     lift: float = math.nan
+    throttle: float = math.nan
     effort: float = math.nan
     lever: float = 0.0
     on_path: bool = True

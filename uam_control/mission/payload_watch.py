@@ -153,6 +153,7 @@ class PayloadWatch:
             tool,
             error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
             lift=readings.lift,
+            throttle=readings.throttle,
             lever=float(levers[self._loaded]),
             on_path=not self._guidance.coming_back,
         )

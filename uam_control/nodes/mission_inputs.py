@@ -76,9 +76,10 @@ class MissionInputs:
         self._supervisor.payload(*read_pose(data))
 
     def _on_thrust(self, data: bytes) -> None:
-        _, _, values = read_values(data, "effort")
-        if len(values):
-            self._inputs.lift(float(values[0]))
+        _, _, lift = read_values(data, "effort")
+        _, _, throttle = read_values(data, "velocity")
+        if len(lift):
+            self._inputs.lift(float(lift[0]), float(throttle[0]))
 
     def _on_imu_bias(self, data: bytes) -> None:
         stamp, _, accelerometer = read_imu(data)

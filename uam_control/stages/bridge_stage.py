@@ -116,9 +116,9 @@ class BridgeStage:
     `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
     they are returned, and the autopilot gets none of them.
     `sent` (4,): body rates [rad/s, FLU] and thrust of the last setpoint, see `sent`;
-    `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by that factor, at
-    LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the report of the
-    autopilot due after the last tick, None if none is due; `last` [ns]: stamp of the last tick.
+    `factor`: thrust factor used for it; `lift_due`: whether factor and `lift` are reported;
+    `report`: the report of the autopilot due after the last tick, None if none is due;
+    `last` [ns]: stamp of the last tick.
     """
 
     factor, lift_due, last, _compiled = Number(), Flag(), Number(), Flag()
@@ -296,8 +296,8 @@ class BridgeStage:
         return self._kept
 
     @property
-    def lift(self) -> float:
-        """See the class."""
+    def lift(self) -> np.ndarray:
+        """See `FlightMeasurements`."""
         return self.measurements.lift
 
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:

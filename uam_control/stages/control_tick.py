@@ -290,7 +290,7 @@ def send_setpoint(tick: ControlTick) -> bool:
         s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference, reference
     )
     if bridge.lift_due:
-        tick.mission.inputs.put(LIFT, s.stamp, (bridge.lift,))
+        tick.mission.inputs.put(LIFT, s.stamp, bridge.lift)
     if bridge.report is not None:
         take_report(tick, bridge.report)
     return True

@@ -1,6 +1,6 @@
 """What the bridge measures in flight, from the setpoints it sends and the motion that follows.
 
-One compiled call per tick: loop delay, thrust factor, lift.
+One compiled call per tick: loop delay, thrust factor, lift and throttle.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class MeasurementArrays(NamedTuple):
     """State of the measurements.
 
     sums: of the loop delay; record, memory: of the thrust identification, both structured (1,);
-    lift (1,) [N].
+    lift (2,): low-passes of the collective [N] and of the normalised thrust.
     """
 
     sums: DelaySums
@@ -69,7 +69,7 @@ def measure(
 ) -> float:
     """Advance the measurements by one tick; return the new thrust factor.
 
-    now [s]; step [s]: since the last tick, for the lift; state (3, 6 + n); curve: see
+    now [s]; step [s]: since the last tick, for the low-passes; state (3, 6 + n); curve: see
     `RateThrustMap.curve`; numbers: of the loop delay.
     """
     sums, record, memory, lift = arrays
@@ -81,30 +81,27 @@ def measure(
     assumed = thrust_of_command(thrust, curve[0], curve[1], curve[2], curve[3])
     gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
     lift[0] += gain * (sent.factor * assumed - lift[0])
+    lift[1] += gain * (thrust - lift[1])
     flown = sent.flown and math.isfinite(thrust)
     return identify(now, state, thrust, assumed, flown, record, memory)
 
 
 class FlightMeasurements:
-    """The measurements: `loop_delay`, `identification`, and the `lift`."""
+    """The measurements: `loop_delay`, `identification`, and the `lift` (2,): low-passes at
+    LIFT_CUTOFF of the collective [N] by the thrust factor used, and of the normalised thrust."""
 
     def __init__(
         self, parameters: ThrustIdentificationParameters, vehicle: VehicleDescription
     ) -> None:
         self.identification = ThrustIdentification(parameters, vehicle)
         self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
-        self._lift = np.zeros(1)
+        self.lift = np.zeros(2)
         memory = self.identification.record, self.identification.memory
-        self.arrays = MeasurementArrays(self.loop_delay.sums, *memory, self._lift)
+        self.arrays = MeasurementArrays(self.loop_delay.sums, *memory, self.lift)
         self._measure = prepared(
             *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), Sent(np.zeros(3), 0.0, True, True, 1.0)),
             *((0.0, 0.0, 0.0, 0.0), self.arrays, self.loop_delay.numbers),
         )
-
-    @property
-    def lift(self) -> float:
-        """Low-pass of the collective [N] by the thrust factor used, at LIFT_CUTOFF."""
-        return self._lift.item(0)
 
     def update(
         self,

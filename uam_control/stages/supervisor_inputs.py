@@ -40,7 +40,7 @@ class StageArrays(NamedTuple):
 
     waits (KINDS,): whether a message of each kind is not read yet; at (KINDS,) [ns]: its stamp;
     values (KINDS, m): of a pose position and quaternion, of the joints their efforts, of fingers
-    opening and force. watched:
+    opening and force, of the lift [N] also the throttle. watched:
     places of the gains with a limit. clock, numbers (1,): of `SupervisorInputs`.
     """
 
@@ -202,6 +202,7 @@ def read_messages(a: StageArrays, stamp: int) -> None:
         take_bias(inputs, at[BIAS] / SECOND, values[BIAS, :3])
     if waits[LIFT]:
         inputs.readings[0].lift = values[LIFT, 0]
+        inputs.readings[0].throttle = values[LIFT, 1]
     for i in range(len(a.watched)):
         if waits[GAINS + i]:
             take_gains(inputs, i, at[GAINS + i] / SECOND, values[GAINS + i], a.watched[i])

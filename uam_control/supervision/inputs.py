@@ -111,9 +111,9 @@ class Inputs:
         """See `take_bias`."""
         self._take_bias(self.arrays, stamp, bias)
 
-    def lift(self, thrust: float) -> None:
-        """Store the filtered collective thrust [N]."""
-        self._readings.lift = thrust
+    def lift(self, thrust: float, throttle: float) -> None:
+        """Store the filtered collective thrust [N] and normalised thrust 0..1."""
+        self._readings.lift, self._readings.throttle = thrust, throttle
 
     def temperature(self, joint: str, degrees: float) -> None:
         """Store the temperature [deg C] of a joint's servo."""

@@ -43,7 +43,7 @@ class Authority(NamedTuple):
 
 NUMBERS = (
     *("battery", "temperature", "missed_ticks", "slower", "contradiction", "lift"),
-    *("mocap_age", "mocap_still", "joint_age", "payload_age"),
+    *("throttle", "mocap_age", "mocap_still", "joint_age", "payload_age"),
     *("controller_age", "pose_controller_age", "autopilot_age"),
     *("round_trip", "loop_delay", "stamp"),
 )  # of the readings
@@ -72,13 +72,13 @@ class Readings:
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
     payload_age [s]: of that pose. grip (2,): opening [m] and closing force [N] of fingers. lift
-    [N]: filtered collective thrust. contradiction [m/s^2]: of motion capture and IMU, the fast
-    change of the accelerometer's estimated bias. slower: than the wall clock, 1 − real-time factor
-    of a simulation. `values`: all NUMBERS.
+    [N]: filtered collective thrust; throttle: the same as sent, 0..1. contradiction [m/s^2]: of
+    motion capture and IMU, the fast change of the accelerometer's estimated bias. slower: than the
+    wall clock, 1 − real-time factor of a simulation. `values`: all NUMBERS.
     """
 
     battery, temperature, missed_ticks, slower, contradiction, lift = (Number() for _ in range(6))
-    mocap_age, mocap_still, joint_age, payload_age = (Number() for _ in range(4))
+    throttle, mocap_age, mocap_still, joint_age, payload_age = (Number() for _ in range(5))
     controller_age, pose_controller_age, autopilot_age = (Number() for _ in range(3))
     round_trip, loop_delay, stamp = (Number() for _ in range(3))
 

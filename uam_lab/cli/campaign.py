@@ -25,7 +25,7 @@ examples:
   uam campaign --draws 181,389             two of the 1,000 flights
   uam campaign --draws 181 --replay        one of them again, with report and video
   uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
-  uam campaign --plant-preset laboratory
+  uam campaign --plant-preset laboratory --ranges laboratory
   uam campaign --out robust                stop with Ctrl-C; the same command continues
   uam campaign --flights 10000 --scheduler tcp://10.0.0.5:8786    on a cluster of yours
 
@@ -53,7 +53,7 @@ def add(commands: Subcommands) -> None:
     command.vehicle()
     command.scenario()
     command.profile()
-    command.option("--ranges", "NAME|FILE", "values to draw: robustness, delays", "robustness")
+    command.option("--ranges", "NAME|FILE", "values to draw: robustness, laboratory, delays", "robustness")
     command.plant()
     command.seed("of the draw")
     command.workers()

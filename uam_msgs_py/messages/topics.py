@@ -166,7 +166,8 @@ SETPOINT = Topic("uam/setpoint", TwistStamped, RELIABLE, BODY, "rad/s, thrust 0.
     to=(PLANT,), about="body rates FLU and thrust 0..1 (linear.z) as sent")
 THRUST = Topic("uam/thrust", JointState, RELIABLE, "", "1, N", "10 Hz", BRIDGE, to=(MISSION,),
     optional=True,
-    about="factor: true / assumed thrust as identified; effort: low-pass of the thrust [N]")
+    about="factor: true / assumed thrust as identified; effort: low-pass of the thrust [N]; "
+    "velocity: the same of the thrust as sent, 0..1")
 POSITION_ADAPTATION = Topic("uam/position/adaptation", JointState, RELIABLE, "", EACH_GAIN, GAINS,
     POSITION, to=(MISSION,), optional=True, about="the gains of the law, by its names")
 ATTITUDE_ADAPTATION = Topic("uam/attitude/adaptation", JointState, RELIABLE, "", EACH_GAIN, GAINS,

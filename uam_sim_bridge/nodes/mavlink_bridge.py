@@ -281,7 +281,7 @@ class MavlinkBridgeNode(UamNode):
         self._end_link(stamp)
         if self.stage.lift_due:
             self._factor_writer.position[0] = self.stage.factor
-            self._factor_writer.effort[0] = self.stage.lift
+            self._factor_writer.effort[0], self._factor_writer.velocity[0] = self.stage.lift
             self._thrust.publish(self._factor_writer.stamped(stamp))
 
     def _end_link(self, stamp: int) -> None:
