@@ -15,7 +15,10 @@ from uam_control.settings import configuration
 from uam_lab.cli import fly as fly_command
 from uam_lab.cli.main import main
 from uam_lab.experiments.campaign.variations import Draws, VariationError, common, ranges
+from uam_lab.experiments.trials.outcome import LANDED, classify
+from uam_lab.experiments.trials.trial import figures_of, recorded
 from uam_lab.records.results.metrics import GROUPS
+from uam_sim_bridge.plant.effects import presets
 
 FLIGHTS = 4
 
@@ -49,6 +52,23 @@ def test_what_failures_have_in_common_is_found():
     values = {name: np.array([d.drawn[name] for d in forty]) for name in ("wind", "mass")}
     name, lost, kept, distance = common(values, values["wind"] > 4.0)[0]
     assert name == "wind" and lost > 4.0 > kept and distance > 1.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("number", "stands"),
+    [(13, True), (15, False)],  # a rotor needs 1.13 of its thrust at the pick; 1.09 at the drop
+)
+def test_a_payload_that_a_rotor_cannot_hold_costs_no_vehicle(number, stands):
+    """Both were carried along the floor before; one of them was lost."""
+    effects = presets.read(["laboratory"], ())
+    flown = Draws(load_profile("s500"), 1000, 1, ranges(), effects=effects)[number]
+    outcome = recorded(flown)
+    figures = figures_of(flown, outcome, outcome.abort_reason)
+    assert classify(outcome.series, figures) == LANDED
+    assert ("set down" in outcome.grasps[-2]["text"]) is stands
+    height = outcome.series["payload.z"][-1]
+    assert bool(height > 0.6) is stands  # on its stand, or beside the vehicle
 
 
 @pytest.mark.parametrize(
