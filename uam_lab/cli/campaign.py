@@ -53,7 +53,8 @@ def add(commands: Subcommands) -> None:
     command.vehicle()
     command.scenario()
     command.profile()
-    command.option("--ranges", "NAME|FILE", "values to draw: robustness, laboratory, delays", "robustness")
+    draw = "values to draw: robustness, laboratory, delays"
+    command.option("--ranges", "NAME|FILE", draw, "robustness")
     command.plant()
     command.seed("of the draw")
     command.workers()
