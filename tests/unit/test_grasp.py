@@ -419,6 +419,7 @@ def test_time_in_which_the_scenario_is_not_flown_does_not_count_as_waiting():
     flight.noise = lambda: np.zeros(3)
     assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
 
+
 def test_the_thrust_with_a_payload_is_expected_from_its_weight():
     """2 kg hover with 0.6; 0.4 kg more: 0.6 * 2.4 / 2."""
     sight = Sight(0.0, 0.0, PLACE, lift=2.0 * 9.81, throttle=0.6)
