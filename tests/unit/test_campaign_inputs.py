@@ -9,6 +9,7 @@ import pytest
 
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
+from uam_lab.cli.campaign import usual_ranges
 from uam_lab.experiments.trials.inputs import inputs
 
 
@@ -50,3 +51,16 @@ def test_gains_options_and_code_are_inputs():
     after = inputs(other, "hover", {"--seed": "2"})
     assert [name for name in before if before[name] != after[name]] == ["--seed", "autopilot gains"]
     assert {"python", "mujoco", "sources and configuration of uam", "laws"} <= before.keys()
+
+
+@pytest.mark.parametrize(
+    ("presets", "ranges"),
+    [
+        ([], "robustness"),
+        (["calm"], "robustness"),
+        (["laboratory"], "laboratory"),
+        (["laboratory", "mine.yaml"], "laboratory"),
+    ],
+)
+def test_the_ranges_are_those_of_the_plant_if_it_has_some(presets, ranges):
+    assert usual_ranges(presets) == ranges

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.mission import load_scenario
@@ -16,7 +17,7 @@ from uam_lab.flights.flight_settings import FlightSettings, SettingsError
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
-TABLE = "flights.parquet"
+TABLE, USUAL = "flights.parquet", "robustness"
 EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
@@ -25,12 +26,13 @@ examples:
   uam campaign --draws 181,389             two of the 1,000 flights
   uam campaign --draws 181 --replay        one of them again, with report and video
   uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
-  uam campaign --plant-preset laboratory --ranges laboratory
+  uam campaign --plant-preset laboratory   with the ranges of that plant
   uam campaign --out robust                stop with Ctrl-C; the same command continues
   uam campaign --flights 10000 --scheduler tcp://10.0.0.5:8786    on a cluster of yours
 
 Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
-from the ranges of config/campaign/robustness.yaml (--ranges). Results in --out: report.html,
+from the ranges of config/campaign/robustness.yaml, or of the file there that is called as the
+plant's preset; --ranges names another one. Results in --out: report.html,
 summary.md, campaign.json, campaign.png, and every flight in flights.parquet and flights.csv. The
 same seed gives the same flights on any number of workers; more --flights only add some.
 """
@@ -53,8 +55,8 @@ def add(commands: Subcommands) -> None:
     command.vehicle()
     command.scenario()
     command.profile()
-    draw = "values to draw: robustness, laboratory, delays"
-    command.option("--ranges", "NAME|FILE", draw, "robustness")
+    draw = "values to draw: robustness, laboratory, delays (default: the plant's, or robustness)"
+    command.option("--ranges", "NAME|FILE", draw, "")
     command.plant()
     command.seed("of the draw")
     command.workers()
@@ -69,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
     vehicle = load_description(options.vehicle)
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     profile = given_profile(options.profile, vehicle)
+    options.ranges = options.ranges or usual_ranges(options.plant_preset)
     allowed = ranges(configuration.named("campaign", options.ranges))
     effects = chosen_effects(options)
     draws = Draws(profile, options.flights, options.seed, allowed, options.scenario, effects)
@@ -99,6 +102,12 @@ def run(options: argparse.Namespace) -> int:
     say(report.write(out, results, vehicle.name, command_line(), _again(options)))
     say(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
+
+
+def usual_ranges(presets: Sequence[str]) -> str:
+    """Return the ranges of the last preset of the plant that has some, else the usual ones."""
+    known = configuration.names("campaign")
+    return next((name for name in reversed(presets) if name in known), USUAL)
 
 
 def _replay(trial: Trial, number: int, out: Path | None) -> int:
