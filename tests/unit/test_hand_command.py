@@ -6,7 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from uam_lab.cli.hand import EXAMPLES
 from uam_lab.cli.main import main
+
+PLACE = ("0.15", "0", "-0.25")
 
 
 def answer(capsys, *words):
@@ -46,7 +49,9 @@ def test_radians_negative_angles_and_the_range_of_a_joint(capsys):
         (["--joints", "1"], "--joints: 1 angles, s500_arm has 2 joints: alpha_1, alpha_2"),
         (["--joints", "1,nan"], "'1,nan' is no list of angles"),
         (["--joints", "1,x"], "'1,x' is no list of angles"),
+        (["--joints", "1,1e308"], "'1,1e308' is no list of angles"),
         (["--joints", "0,0", "--vehicle", "none"], "unknown vehicle 'none'"),
+        (["--joints", "0,0", "--position", "0", "0", "0"], "--position: is of ik"),
     ],
 )
 def test_wrong_use_is_refused_in_one_line(capsys, words, text):
@@ -102,6 +107,20 @@ def test_the_workspace(tmp_path, capsys):
     np.testing.assert_allclose(found["lowest_m"], [-0.24, 0.0, -0.343], atol=2e-3)
     assert found["highest_m"][:2] == pytest.approx([0.24, 0.0], abs=2e-3)
     assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("file", "why"), [("reach.txt", "ends in .png"), (".", "ends in .png"), ("no/a.png", "folder")]
+)
+def test_a_picture_that_cannot_be_written(tmp_path, capsys, file, why):
+    assert main(["hand", "workspace", "--out", str(tmp_path / file)]) == 2
+    error = capsys.readouterr().err
+    assert why in error and error.count("\n") == 1
+
+
+def test_the_example_of_the_help_is_within_reach(capsys):
+    assert f"ik --position {' '.join(PLACE)} " in EXAMPLES
+    assert main(["hand", "ik", "--position", *PLACE]) == 0
 
 
 def test_what_an_action_needs_is_told(capsys):

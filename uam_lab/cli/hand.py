@@ -14,19 +14,21 @@ from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import DOWN, hand_pose, vehicle_centre
 from uam_control.maths.rotations import quaternion_from_matrix
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of, load_description
-from uam_lab.cli.command import Command, Subcommands, number
+from uam_lab.cli.command import Command, Subcommands, number, refuse_given
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.records.results.terminal import say
 
 DONE, BEYOND = 0, 1
 NEAR = 1e-6  # [m] at which a place is reached
+LARGEST = 1e4  # angle of a joint, as given
 POSTURES = 20000  # of the workspace
 NEEDS = {"fk": "joints", "ik": "position"}  # options by action
+OF = {"joints": "fk", "degrees": "fk", "position": "ik", "out": "workspace"}  # actions by option
 EXAMPLES = """\
 examples:
   uam hand fk --joints 0.5,1.0                             forward kinematics, angles in radians
   uam hand fk --joints=-45,-45 --degrees --json            in degrees; for a program
-  uam hand ik --position 0.2 0 -0.25                       angles for a place in the base frame [m]
+  uam hand ik --position 0.15 0 -0.25                      angles for a place in the base frame [m]
   uam hand workspace --out reach.png                       where it can be, as a picture
 
 The base is level; an end effector on a passive hinge hangs. position_m and orientation_wxyz: of
@@ -65,8 +67,10 @@ def angles(text: str) -> list[float]:
         found = [float(word) for word in text.split(",")]
     except ValueError:
         found = [math.nan]
-    if not all(map(math.isfinite, found)):
-        raise argparse.ArgumentTypeError(f"'{text}' is no list of angles, as 0.5,1.0")
+    if not all(abs(one) <= LARGEST for one in found):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is no list of angles, as 0.5,1.0, at most {LARGEST:g}"
+        )
     return found
 
 
@@ -75,6 +79,10 @@ def run(options: argparse.Namespace) -> int:
     needed = NEEDS.get(options.action, "")
     if needed and getattr(options, needed) is None:
         raise SettingsError(f"{options.action} needs --{needed}")
+    for name, action in OF.items():
+        if action != options.action:
+            refuse_given(f"is of {action}", **{name: getattr(options, name)})
+    _check_picture(options.out)
     vehicle = load_description(options.vehicle)
     chain = chain_of(vehicle)
     if not chain.has_hand:
@@ -90,6 +98,16 @@ def run(options: argparse.Namespace) -> int:
             numbers = isinstance(value, list) and value and isinstance(value[0], float)
             say(f"{name:<18} {' '.join(f'{one:.6f}' for one in value) if numbers else value}")
     return BEYOND if found.get("distance_m", 0.0) > NEAR else DONE
+
+
+def _check_picture(file: Path | None) -> None:
+    """Raise SettingsError for a file that no PNG can be written to."""
+    if file is None:
+        return
+    if file.suffix.lower() != ".png" or file.is_dir():
+        raise SettingsError(f"--out {file}: a file whose name ends in .png is needed")
+    if not file.parent.is_dir():
+        raise SettingsError(f"--out {file}: there is no folder {file.parent}")
 
 
 def _fk(vehicle: VehicleDescription, chain: Chain, options: argparse.Namespace) -> dict[str, Any]:
