@@ -214,6 +214,7 @@ BASE = "base: {kind: circle, radius: 0.05, period: 3.3}"
             "sweep: [{cycles: 9, amplitude_deg: 50}]",
             "slower",
         ),
+        ("shape: circle, radius: 1, spin: 1", "spin: unknown; allowed: kind, shape, elevation, "),
         ("shape: hold, position: [0, 0, 0.9]", "base is missing"),
         (f"shape: hold, position: [0, 0, 0.9], {BASE[:-1]}, height: 1}}", "base.height: not of"),
         (

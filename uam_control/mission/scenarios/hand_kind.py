@@ -32,7 +32,7 @@ from uam_control.mission.scenarios.hand_motion import (
     holding,
 )
 from uam_control.mission.scenarios.ramps import at_rest
-from uam_control.mission.scenarios.reference_kinds import Middle, cut, legs
+from uam_control.mission.scenarios.reference_kinds import Middle, cut, keys_of, legs
 from uam_control.mission.scenarios.route import Leg
 from uam_control.mission.scenarios.scenario import LONGEST_FILE, ScenarioError, check_length
 from uam_control.settings.csv_table import CsvTable
@@ -144,6 +144,7 @@ class _Reader:
 
     def curve(self, kind: str) -> HandSource:
         """Return a task along a curve or line of another kind."""
+        self._entry.only([*OWN, *(key for key in keys_of(kind) if key not in ("kind", "at"))])
         values = {key: one for key, one in self._entry.values.items() if key not in OWN}
         sweeps = [self._sweep(one) for one in self._entry.entries("sweep", True)]
         swing = max((abs(one["amplitude_deg"]) for one in sweeps), default=0.0)

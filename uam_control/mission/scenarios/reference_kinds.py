@@ -41,13 +41,17 @@ class Middle:
     joints: tuple[tuple[float, float], ...]
 
 
+def keys_of(kind: str) -> tuple[str, ...]:
+    """Return the entries that a trajectory of a kind may have."""
+    return WAYPOINT_KEYS if kind == "waypoints" else (*CURVE_KEYS, *SHAPES[kind])
+
+
 def legs(entry: Section, middle: Middle) -> tuple[Leg, ...]:
     """Return the trajectory of the entry, from rest to rest. Raises the section's error."""
     kind = entry.text("kind")
     if kind not in KINDS:
         raise entry.error("kind", f"{kind!r}, allowed: {', '.join(KINDS)}")
-    allowed = WAYPOINT_KEYS if kind == "waypoints" else (*CURVE_KEYS, *SHAPES[kind])
-    entry.only(allowed)
+    entry.only(keys_of(kind))
     pose = middle.chi.copy()
     if "arm_deg" in entry.values:
         pose[ARM] = np.radians(entry.numbers("arm_deg", len(middle.joints)))
