@@ -112,9 +112,13 @@ class HandSource:
         if self.base is None:
             return "; a slower task, or a calmer posture, helps"
         chain, task = self.flyer.chain, self.task.path.first
-        mid = (self.base.first + self.base.rows(self.base.knots, 1)[CHI].mean(axis=0)) / 2.0
-        away = float(np.linalg.norm(task[POSITION] - mid[POSITION] - chain.offsets[0]))
-        return f"; the arm reaches {reach(chain):.2f} m from its first joint, {away:.2f} m needed"
+        times = np.arange(self.base.knots[0], self.base.knots[-1], LOOKS)
+        shoulders = self.base.rows(times, 1)[CHI, :, POSITION] + chain.offsets[0]
+        away = np.linalg.norm(task[POSITION] - shoulders, axis=1).max()
+        return (
+            f"; the arm reaches {reach(chain):.2f} m from its first joint, up to {away:.2f} m "
+            "needed"
+        )
 
 
 def hand_source(entry: Section, vehicle: VehicleDescription, folder: Path) -> HandSource:
