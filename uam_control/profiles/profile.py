@@ -307,6 +307,7 @@ def profile_of(
     file: named in the profile and in errors; vehicle: see `load_profile`.
     """
     sets, vehicle = {}, vehicle or load_description()
+    _check_whole(file, {node: _law_of(sections.get(node, {})) for node in CONTROLLERS})
     derived = derived_parameters(vehicle)
     if ESTIMATOR in sections:
         try:
@@ -329,15 +330,18 @@ def profile_of(
             raise ProfileError(text) from None
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
-    _check_whole(file, {node: sets[node].law for node in CONTROLLERS})
     return Profile(file.stem, file, vehicle, sets, sections)
+
+
+def _law_of(section: Mapping[str, Any]) -> str:
+    return str(section.get("law", catalogue.DEFAULT))
 
 
 def _check_whole(file: Path, laws: Mapping[str, str]) -> None:
     """Refuse a law of the whole body that only some controllers have; laws: controller → law."""
     for node, law in laws.items():
         other = next((one for one in laws if laws[one] != law), None)
-        if catalogue.law(law).whole and other:
+        if other and law in catalogue.LAWS and catalogue.LAWS[law].whole:
             raise ProfileError(
                 f"{file}: {node}: law: {law} is one law of all three controllers, but {other} has "
                 f"{laws[other]}"

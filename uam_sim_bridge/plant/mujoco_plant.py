@@ -85,7 +85,7 @@ class MujocoPlant(Plant):
 
         mujoco.mj_forward(model, data)
         self._specific_force = self._sensed_force.copy()
-        self._drawn = range(0)  # ticks for which there is noise
+        self._drawn, self._observed = range(0), -1  # ticks that have noise, newest observed one
         self._added_wind = np.zeros(3)  # by disturbances
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
         self._hinge = PayloadHinge(model, data) if hinged else None
@@ -268,7 +268,9 @@ class MujocoPlant(Plant):
 
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`."""
-        self._draw_due()
+        if self.tick == self._observed or self.tick not in self._drawn:
+            self.draw_noise()
+        self._observed = self.tick
         self._sense(row)
         self.effects.check()
         return self.arrived()
@@ -287,10 +289,6 @@ class MujocoPlant(Plant):
         lasts = min(self._imu.noise.draw(), poses, gusts, self.effects.draw())
         self._drawn = range(self.tick, self.tick + lasts)
         return lasts
-
-    def _draw_due(self) -> None:
-        if self.tick not in self._drawn:
-            self.draw_noise()
 
     def arrived(self) -> Samples:
         """Return the samples that have arrived at this tick, as copies."""
@@ -320,7 +318,8 @@ class MujocoPlant(Plant):
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
-        self._draw_due()
+        if self.tick not in self._drawn:
+            self.draw_noise()
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
         error = self._step(motor_commands, arm_command, magnet)
