@@ -254,6 +254,29 @@ def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
     assert 0.0 <= record["end_s"] - at - duration + 1e-5 <= 2.0 * step + 1e-5
 
 
+@given(times, times, st.floats(0.0, 50.0))
+def test_for_as_long_as_it_says_a_timeline_changes_nothing(at, duration, takeoff):
+    line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), at, duration),)))
+    assert line.unchanged_for(takeoff) == 0.0  # the take-off may come at any time
+    line.mission_at(takeoff, 0.0, "take-off")
+    step, promised, began = max(0.5, (at + duration) / 200.0), 0.0, 0
+    for tick in range(int((at + duration) / step) + 3):
+        stamp = takeoff + tick * step
+        changed = line.update(stamp)
+        assert not changed or stamp >= promised - 1e-9
+        began += len(changed)
+        promised = stamp + line.unchanged_for(stamp)
+    assert began == 2 and promised == math.inf
+
+
+def test_until_its_phase_begins_a_fault_changes_nothing():
+    line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), 1.0, 2.0, "pick"),)))
+    line.mission_at(5.0, 0.0, "take-off")
+    assert line.unchanged_for(6.0) == math.inf
+    line.mission_at(8.0, 3.0, "pick")  # from 9 s on
+    assert line.unchanged_for(8.0) == pytest.approx(1.0, abs=1e-5)
+
+
 def test_numbers_of_an_option():
     assert parse_spec("x@1e1+2:a=3,b=c") == {
         "fault": "x",

@@ -104,6 +104,23 @@ def test_faults_of_the_motion_capture_leave_no_trace_after_their_end(name):
         assert equal(ours.mocap, usual.mocap)
 
 
+@pytest.mark.parametrize(
+    ("fault", "senses", "acts"),
+    [("mocap_dropout", True, False), ("servo_weak", False, True), ("wind_gust", False, True)],
+)
+def test_a_fault_says_what_it_changes_until_it_is_over(fault, senses, acts):
+    plant, found = plant_with(f"{fault}@0.1+0.2"), []
+    while plant.time < 0.4:
+        plant.sense()
+        found.append((plant.time, plant.senses, plant.acts))
+        plant.step(HOVER, np.zeros(2), False)
+    assert {one[1:] for one in ticks(found, BEGIN, END)} == {(senses, acts)}
+    assert {one[1:] for one in ticks(found, 0.0, BEGIN)} == {(False, False)}
+    after = ticks(found, END, 0.4)
+    assert after[0][2] == acts  # once more, which undoes it
+    assert {one[1:] for one in after[1:]} == {(False, False)}
+
+
 def test_no_poses_arrive():
     rows = faulty("mocap_dropout")
     assert poses(during(rows)) == [] and len(poses(rows)) > 10
