@@ -157,11 +157,12 @@ class CompiledTicks:
         self._in_python = [objects[0], *runs, None, *objects[1:]]
         me = proxy(self)
         parts = [
-            step or (lambda place=place: me._in_turn(place)) for place, step in enumerate(steps)
+            step or (lambda place=place: me._safely(me._do, place))
+            for place, step in enumerate(steps)
         ]
         last = Step(unreported, (control.bridge.arrays,))
         asked = bound(*last)
-        question = (lambda: me._nominal_after(asked())) if asks else last
+        question = (lambda: me._safely(me._may_go_on, asked)) if asks else last
         self._steps = Steps(parts, 1 + len(stages), question)
 
     @property
@@ -277,23 +278,21 @@ class CompiledTicks:
             raise self._error
         return done, end
 
-    def _in_turn(self, place: int) -> int:
-        """Do a part in Python; say its outcome."""
+    def _safely(self, function: Callable[..., int], argument: object) -> int:
+        """Call a function in Python; what it raises could not come out of the loop from there."""
         try:
-            return self._do(place)
-        except BaseException as error:  # from here it could not come out of the loop
-            self._error = error
-            return ENDED
-
-    def _nominal_after(self, outcome: int) -> int:
-        """Say whether further ticks may follow, after a part in Python that may decide."""
-        try:
-            return outcome if outcome != DONE or self._nominal() else ASK
+            return function(argument)
         except BaseException as error:
             self._error = error
             return ENDED
 
+    def _may_go_on(self, asked: Callable[[], int]) -> int:
+        """Answer the question after a tick with a part in Python that may decide."""
+        outcome = asked()
+        return outcome if outcome != DONE or self._nominal() else ASK
+
     def _do(self, place: int) -> int:
+        """Do a part in Python; say its outcome."""
         control = self._flight.control
         if 0 < place < len(self._in_python) - 1:  # the plant needs neither
             self._take_report()
