@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rcl_interfaces.srv import GetParameters
+from std_srvs.srv import SetBool, Trigger
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.whole_body import WholeBody
@@ -262,3 +264,19 @@ def test_a_state_with_nan_is_refused_and_the_next_one_used(start, probe):
         return magnet
 
     probe.until(answered, "a good state to be used")
+
+
+@pytest.mark.parametrize("layout", [start_separately, start_fused])
+def test_the_node_of_the_whole_body_acts_on_all_three_controllers(start, probe, layout):
+    def adapts(node):
+        request = GetParameters.Request(names=["adapt"])
+        return probe.call(GetParameters, f"/{node}/get_parameters", request).values[0].bool_value
+
+    layout(start, WHOLE_BODY_L1)
+    name = "/whole_body_controller/freeze_adaptation"
+    for frozen in (True, False):
+        answer = probe.call(SetBool, name, SetBool.Request(data=frozen))
+        assert answer.success and answer.message.count("adapted gains") == 3
+        assert [adapts(node) for node in NODES[2:]] == 3 * [not frozen]
+    answer = probe.call(Trigger, "/whole_body_controller/reset_adaptation", Trigger.Request())
+    assert answer.success and answer.message.count("at their initial values") == 3

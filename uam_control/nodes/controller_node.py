@@ -85,8 +85,8 @@ class ControllerNode(UamNode):
         }
         for topic in inputs:
             self.listen(topic, partial(self._add, topic.name, readers[topic]))
-        self.create_service(Trigger, f"~/{RESET}", self._on_reset)
-        self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
+        self.create_service(Trigger, f"~/{RESET}", self.reset)
+        self.create_service(SetBool, f"~/{FREEZE}", self.freeze)
 
     def _add(self, name: str, read: Callable[[bytes], tuple], data: bytes) -> None:
         self._join.add(name, *read(data))
@@ -130,7 +130,8 @@ class ControllerNode(UamNode):
         """Return the message of a command; see `send`."""
         raise NotImplementedError
 
-    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Set the adapted gains to their initial values."""
         controller = self.controller
         old = self._adapted()
         controller.reset_adaptation()
@@ -141,7 +142,7 @@ class ControllerNode(UamNode):
         response.message = f"adapted gains at their initial values: {_listed(new)}"
         return response
 
-    def _on_freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+    def freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         """Set the parameter `adapt`, so that service and parameter always agree."""
         result = self.change_parameters([Parameter("adapt", value=not request.data)], FREEZE)
         frozen = "frozen at" if request.data else "free, from"

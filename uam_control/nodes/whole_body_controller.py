@@ -4,16 +4,19 @@
 
 The nodes are position_controller, attitude_controller and arm_controller, with their parameters,
 services and topics. In flight the position's computes all three outputs of a tick; the others
-publish theirs when its command arrives.
+publish theirs when its command arrives. The node `whole_body_controller` beside the three has what
+concerns the law as a whole.
 """
 
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
+from std_srvs.srv import SetBool, Trigger
 
 from uam_control.nodes.arm_controller import ArmControllerNode
 from uam_control.nodes.attitude_controller import AttitudeControllerNode
-from uam_control.nodes.controller_node import ControllerNode
+from uam_control.nodes.controller_node import FREEZE, RESET, ControllerNode
 from uam_control.nodes.position_controller import PositionControllerNode
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.law_stages import WholeBodyPart, WholeBodyStage
@@ -21,12 +24,54 @@ from uam_msgs_py.messages.node_names import WHOLE_BODY
 from uam_msgs_py.node.base_node import UamNode, run_together
 from uam_msgs_py.node.executor import spin as spin_nodes
 
+Answer = TypeVar("Answer", Trigger.Response, SetBool.Response)
 
-def make() -> list[ControllerNode]:
+
+class WholeBodyNode(UamNode):
+    """Services and diagnostics of the law as a whole; a tick is one of all three controllers."""
+
+    def __init__(self, parts: Sequence[ControllerNode]) -> None:
+        """parts: the controllers, in the order in which they act in a tick."""
+        super().__init__(WHOLE_BODY)
+        self._parts = tuple(parts)
+        self.create_service(Trigger, f"~/{RESET}", self._on_reset)
+        self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
+
+    def settle(self) -> None:
+        """Count the ticks of the controllers."""
+        self.stamp, self.ticks = self._parts[-1].stamp, self._parts[-1].ticks
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        answers = [node.reset(request, Trigger.Response()) for node in self._parts]
+        return _together(answers, response)
+
+    def _on_freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        answers = [node.freeze(request, SetBool.Response()) for node in self._parts]
+        return _together(answers, response)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        level, summary, values = super().diagnose()
+        law = self._parts[0].controller.law
+        values |= {
+            "law": law.parameters.law,
+            "nodes": ", ".join(node.get_name() for node in self._parts),
+            "frozen": ", ".join(n.get_name() for n in self._parts if n.controller.law.frozen),
+        }
+        return level, summary, values
+
+
+def _together(answers: Sequence[Answer], response: Answer) -> Answer:
+    """Write the answers of all controllers into one."""
+    response.success = all(answer.success for answer in answers)
+    response.message = "; ".join(answer.message for answer in answers)
+    return response
+
+
+def make() -> list[UamNode]:
     """Return the nodes of the process. Raises ParameterError."""
     nodes = [PositionControllerNode(), AttitudeControllerNode(), ArmControllerNode()]
     join(nodes)
-    return nodes
+    return [*nodes, WholeBodyNode(nodes)]
 
 
 def join(nodes: Sequence[ControllerNode]) -> None:

@@ -124,6 +124,9 @@ def make() -> list[UamNode]:
             except ValueError as error:  # ParameterError, ProfileError, ScenarioError ...
                 raise ParameterError(f"{name}: {error}") from None
     process.join(nodes)
+    laws = [nodes[name] for name in wiring.CONTROLLERS if name in nodes]
+    if any(node.controller.law.whole for node in laws):
+        nodes[wiring.WHOLE_BODY] = whole_body_controller.WholeBodyNode(laws)
     return [process, *nodes.values()]
 
 
