@@ -25,7 +25,7 @@ KEYS = {
     "markupsafe": "python3-markupsafe",
     "yaml": "python3-yaml",
 }
-# rosdep has no key for these: docs/first_flight.md installs them by pip
+# rosdep has no key for these: docs/index.md installs them by pip
 WITHOUT_KEY = {"dask", "distributed", "imageio_ffmpeg", "optuna", "pyarrow", "viser"}
 # of the extra `hardware`, imported where a device is chosen; rosdep has no key for them either
 WITHOUT_KEY |= {"gpiod", "motioncapture", "natnet"}

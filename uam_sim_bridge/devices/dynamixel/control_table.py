@@ -81,7 +81,7 @@ def folder() -> Path:
     if found is None or found.origin is None:
         raise ControlTableError(
             "the package dynamixel-sdk is missing: pip install -e '.[hardware]' in a clone; "
-            "colcon: docs/first_flight.md"
+            "colcon: docs/index.md"
         )
     return Path(found.origin).parent / "control_table"
 

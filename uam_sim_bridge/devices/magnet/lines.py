@@ -66,7 +66,7 @@ class GpioLine(Line):
         if gpiod is None:
             raise MagnetError(
                 "chip: the package gpiod is missing: pip install -e '.[hardware]' in a clone; "
-                "colcon: docs/first_flight.md"
+                "colcon: docs/index.md"
             )
         settings = gpiod.LineSettings(
             direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE

@@ -42,7 +42,7 @@ class LibrarySource:
         if importlib.util.find_spec("motioncapture") is None:
             raise MocapError(
                 "source motioncapture needs the package motioncapture: pip install -e "
-                "'.[hardware]' in a clone; colcon: docs/first_flight.md"
+                "'.[hardware]' in a clone; colcon: docs/index.md"
             )
         options = {"hostname": server}
         if system == "optitrack":

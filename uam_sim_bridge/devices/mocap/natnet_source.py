@@ -48,7 +48,7 @@ class NatNetSource:
         if Version is None:
             raise MocapError(
                 "source natnet needs the package natnet: pip install -e '.[hardware]' in a clone; "
-                "colcon: docs/first_flight.md"
+                "colcon: docs/index.md"
             )
         try:
             self._server = socket.gethostbyname(server), port
