@@ -3,13 +3,14 @@
 import dataclasses
 import math
 
+from servo_shafts import StillShaft
 from set_clock import SetClock
 
 from uam_control.vehicle import load_description
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.serial.serial_port import SerialPort
 

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 from arm_rig import BAUD, STOWED
+from servo_shafts import StillShaft
 from std_srvs.srv import SetBool, Trigger
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointCommandWriter, read_joints, read_values
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 
 MODULE = "uam_sim_bridge.nodes.arm_driver"
 NAMES = ["alpha_1", "alpha_2"]

@@ -16,10 +16,11 @@ import pytest
 import yaml
 from arm_rig import BAUD, STOWED
 from autopilot_on_a_line import AutopilotOnALine
+from servo_shafts import StillShaft
 
 from uam_lab.flights.processes.process_table import nodes
 from uam_lab.flights.vehicle.lab_file import template
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
 from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
 

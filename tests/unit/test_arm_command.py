@@ -2,9 +2,10 @@
 
 import pytest
 from arm_rig import BAUD, STOWED
+from servo_shafts import StillShaft
 
 from uam_lab.cli.main import main
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 
 
 @pytest.fixture

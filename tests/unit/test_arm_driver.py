@@ -9,10 +9,11 @@ import pytest
 from arm_rig import BAUD, PATIENT, STOWED, ArmRig, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from servo_shafts import StillShaft
 
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 from uam_sim_bridge.devices.dynamixel.goals import goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.servo_bus import BusLost

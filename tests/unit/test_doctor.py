@@ -12,6 +12,7 @@ from importlib import metadata
 
 import pytest
 from arm_rig import BAUD, STOWED
+from servo_shafts import StillShaft
 
 from uam_lab.cli import doctor as command
 from uam_lab.cli.main import main
@@ -20,7 +21,7 @@ from uam_lab.preflight.doctor import devices, installation, run
 from uam_lab.preflight.doctor.check_process import TOO_LATE, CheckProcess
 from uam_lab.preflight.doctor.finding import Verdict, fail, ok, warn
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 
 OK, WARN, FAIL = Verdict

@@ -9,6 +9,7 @@ from arm_rig import BAUD, PATIENT, ArmRig, LinePort, described, raw_bus
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PortHandler, Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
+from servo_shafts import FrictionShaft, StillShaft
 from set_clock import SetClock
 
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
@@ -22,9 +23,7 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     Drive,
     EmulatedBus,
     EmulatedServo,
-    FrictionShaft,
     ServoLine,
-    StillShaft,
 )
 from uam_sim_bridge.devices.dynamixel.health import (
     ERROR_BITS,

@@ -3,11 +3,12 @@
 from arm_rig import BAUD, ArmRig, LinePort
 from hypothesis import given
 from hypothesis import strategies as st
+from servo_shafts import StillShaft
 from set_clock import SetClock
 
 from uam_sim_bridge.devices.dynamixel.bus import LATEST, DynamixelBus, Instruction, Overdue
 from uam_sim_bridge.devices.dynamixel.control_table import control_table
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.protocol import READ, Packet
 from uam_sim_bridge.devices.servo_bus import NoAnswer
 

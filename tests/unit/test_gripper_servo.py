@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from arm_rig import BAUD, PATIENT, LinePort
+from servo_shafts import StillShaft
 from set_clock import SetClock
 
 from uam_control.settings.section import Section
@@ -21,7 +22,6 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     ArmShafts,
     EmulatedServo,
     ServoLine,
-    StillShaft,
 )
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.mocap import calibration

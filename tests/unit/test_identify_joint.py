@@ -9,11 +9,12 @@ import yaml
 from arm_rig import BAUD, ArmRig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from servo_shafts import FrictionShaft
 from set_clock import SetClock
 
 from uam_lab.cli import identify_joint
 from uam_lab.cli.main import main
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo, FrictionShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 from uam_sim_bridge.devices.dynamixel.excitation import (
     Aborted,
     Excitation,

@@ -11,6 +11,7 @@ import yaml
 from arm_rig import LinePort
 from hypothesis import given
 from hypothesis import strategies as st
+from servo_shafts import StillShaft
 
 from uam_control.settings import configuration
 from uam_lab.flights.vehicle.lab import LabError, Room
@@ -20,7 +21,7 @@ from uam_lab.flights.vehicle.vehicle_nodes import parameters
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
-from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine, StillShaft
+from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.magnet.lines import LineParameters
 from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters

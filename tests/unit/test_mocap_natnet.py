@@ -17,14 +17,13 @@ from natnet.data_frame import DataFrame
 from natnet.packet_buffer import PacketBuffer
 from natnet.version import Version
 
-from uam_control.maths.rotations import quaternion_from_euler
+from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap import driver as driver_module
 from uam_sim_bridge.devices.mocap import natnet_messages
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer, Streaming
-from uam_sim_bridge.devices.mocap.emulated.plant_poses import poses_of
 from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 from uam_sim_bridge.devices.mocap.library_source import LibrarySource
@@ -57,6 +56,15 @@ words = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=
 
 def still(_):
     return {"uam": (POSITION, QUATERNION), "box": (np.zeros(3), np.array([1.0, 0, 0, 0]))}
+
+
+def poses_of(truth, payload_top):
+    """name → position and quaternion; payload_top [m]: its pose is the middle of its upper side."""
+    up = matrix_from_quaternion(truth.payload_quaternion)[:, 2]
+    return {
+        "uam": (truth.state[0, :3].copy(), truth.quaternion.copy()),
+        "payload": (truth.payload_position + payload_top * up, truth.payload_quaternion.copy()),
+    }
 
 
 def serving(names=("uam", "box"), poses=still, disturbances=None, seed=0, **how):

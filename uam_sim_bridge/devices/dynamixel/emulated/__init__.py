@@ -6,8 +6,6 @@ from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
 from uam_sim_bridge.devices.dynamixel.emulated.shafts import (
     ArmShafts,
     Drive,
-    FrictionShaft,
     JointShaft,
     Shaft,
-    StillShaft,
 )
