@@ -6,9 +6,9 @@ import yaml
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.offboard_parameters import OffboardParameters
-from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.setpoint_types import SetpointParameters
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterSet

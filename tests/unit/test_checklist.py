@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_lab.preflight.checklist.automatic import automatic
-from uam_lab.preflight.checklist.checklist import Checklist
+from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.host import HostReader, governors
@@ -24,11 +24,11 @@ from uam_lab.preflight.checklist.observation import (
     Observation,
     PreArmLine,
     Resting,
+    Stream,
+    StreamReport,
 )
-from uam_lab.preflight.checklist.record import record
 from uam_lab.preflight.checklist.samples import Sample
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
-from uam_lab.preflight.checklist.streams import Stream, StreamReport
 from uam_lab.preflight.checklist.switch_steps import ConfirmStep, KillStep, MagnetStep
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message, read_items
 from uam_msgs_py.messages.status import ChecklistState, RadioState

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.setpoints.kinds.desired import Desired, level
+from uam_control.setpoints.desired import Desired, level
 from uam_control.setpoints.level_hold import UNKNOWN, HoldParameters, LevelHold
 
 TILTED = np.array([0.1, -0.2, 1.0])

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_sim_bridge.devices.mocap.clock_offset import DRIFT_MAX, ClockOffset
-from uam_sim_bridge.devices.mocap.frame_count import RESTART, FrameCount
+from uam_sim_bridge.devices.mocap.driver import RESTART, FrameCount
 
 RATE = 120.0
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_sim_bridge.mavlink.hil.hil_thinning import Thinner, sustainable_rate
+from uam_sim_bridge.mavlink.hil.router import Thinner, sustainable_rate
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 from uam_sim_bridge.mavlink.transport.outbox import Outbox
 from uam_sim_bridge.mavlink.transport.pacing import Meter, Pacer

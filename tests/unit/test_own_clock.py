@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.autopilot.own_clock import LEAST, WITHIN, OwnClock
+from uam_sim_bridge.autopilot.server import LEAST, WITHIN, OwnClock
 
 PERIOD = 0.004
 

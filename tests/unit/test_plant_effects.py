@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.faulty_plant import make_plant
-from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
+from uam_sim_bridge.mavlink.transport.faulty_transport import LateTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.acting_effects import generator

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from uam_control.ages import age_by
-from uam_control.setpoints.kinds.desired import Desired, level
-from uam_control.setpoints.kinds.position import position_setpoint
+from uam_control.setpoints.desired import Desired, level
 from uam_control.setpoints.position_target import FLOWN_MASKS, PositionTarget
+from uam_control.setpoints.setpoint_types import position_setpoint
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion

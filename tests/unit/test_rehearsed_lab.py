@@ -17,8 +17,8 @@ from uam_lab.experiments.faults.rehearsed import judged, with_checklist
 from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.options import RehearsalOptions
-from uam_lab.flights.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import load_lab, template

@@ -1,6 +1,6 @@
 """The plant in lockstep does not wait for a node that is being restarted."""
 
-from uam_sim_bridge.nodes.restart import Restart
+from uam_sim_bridge.nodes.lockstep import Restart
 
 
 def test_without_a_restart_it_waits():

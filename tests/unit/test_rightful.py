@@ -9,7 +9,7 @@ from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.refusals import Refusals
+from uam_msgs_py.node.door import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, Rightful, RightfulNodes
 from uam_msgs_py.node.stamp_watch import LASTING, StampWatch
 

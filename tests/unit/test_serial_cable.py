@@ -9,8 +9,7 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.devices.serial.bit_errors import disturbed
-from uam_sim_bridge.devices.serial.serial_cable import SerialCable, Wire
+from uam_sim_bridge.devices.serial.serial_cable import SerialCable, Wire, disturbed
 
 BAUD = 921600
 PATIENCE = 30.0  # [s]

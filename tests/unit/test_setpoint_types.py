@@ -4,10 +4,8 @@ import math
 
 import numpy as np
 
-from uam_control.setpoints.kinds.attitude import attitude_setpoint
-from uam_control.setpoints.kinds.desired import Desired, level
-from uam_control.setpoints.kinds.rates import rates_setpoint
-from uam_control.setpoints.kinds.wrench import wrench_setpoint
+from uam_control.setpoints.desired import Desired, level
+from uam_control.setpoints.setpoint_types import attitude_setpoint, rates_setpoint, wrench_setpoint
 
 HALF = math.sqrt(0.5)
 # turned left by a quarter turn: nose to the north

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_lab.experiments.workers.window import LOST_AT_MOST, PER_WORKER, Window
+from uam_lab.experiments.workers.workers import LOST_AT_MOST, PER_WORKER, Window
 
 
 def test_items_are_drawn_only_when_there_is_room():

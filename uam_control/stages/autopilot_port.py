@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from uam_control.offboard.modes import Mode
-from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.desired import Target
 from uam_control.setpoints.vision_pose import VisionPose
 
 

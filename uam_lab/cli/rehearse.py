@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     """Rehearse and report; return the exit status."""
     require_ros()
     from uam_lab.flights.rehearsal import device_figures
-    from uam_lab.flights.rehearsal.flown_rehearsal import fly
+    from uam_lab.flights.rehearsal.engine import fly
     from uam_lab.flights.rehearsal.options import RehearsalOptions
 
     lab = load_lab(options.config)

@@ -23,10 +23,10 @@ from uam_lab.preflight.checklist.observation import (
     Observation,
     PreArmLine,
     Resting,
+    Stream,
 )
 from uam_lab.preflight.checklist.samples import GyroIntegral, Sample, Window
 from uam_lab.preflight.checklist.step import Situation
-from uam_lab.preflight.checklist.streams import Stream
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.layouts import BadMessage

@@ -24,12 +24,11 @@ from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.services import Services
 from uam_lab.preflight.checklist.automatic import automatic
-from uam_lab.preflight.checklist.checklist import AUTOMATIC, GUIDED, Checklist
+from uam_lab.preflight.checklist.checklist import AUTOMATIC, GUIDED, Checklist, record
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.host import HostReader
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import Box, Observation
-from uam_lab.preflight.checklist.record import record
 from uam_lab.preflight.checklist.step import Step, StepState
 from uam_lab.preflight.checklist_feed import Feed
 from uam_lab.records.results.atomic import write_text

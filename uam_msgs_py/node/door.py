@@ -5,6 +5,9 @@ no reader expects. None of it ends a program. The next good message is used.
 
 Messages are taken serialized: rclpy would raise for bytes that are none, and the middleware would
 discard them without a word.
+
+Other joint names or their order, wrong lengths, numbers that are not finite, stamps of another
+clock: the next good message is used.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from rclpy.node import Node
@@ -21,7 +25,6 @@ from rclpy.subscription import Subscription
 from uam_control.settings.visible_text import visible
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
-from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
 from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, publishers
 from uam_msgs_py.node.taking import Taker
@@ -30,6 +33,41 @@ LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
 NAMES_PERIOD = 0.1  # s of wall time between two looks at who publishes a topic
 
 T = TypeVar("T")
+
+
+@dataclass
+class Refused:
+    """sender: node name; rightful: name of the node that may publish; reason: of the newest."""
+
+    sender: str
+    rightful: str
+    reason: str = ""
+    count: int = 0
+
+
+class Refusals:
+    """Counts the refused messages of each topic and sender."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, str], Refused] = {}
+
+    def note(self, topic: str, sender: str, rightful: str, reason: str) -> None:
+        """Count a message; topic: absolute name; sender, rightful: node names."""
+        one = self._found.setdefault((topic, sender), Refused(sender, rightful))
+        one.rightful, one.reason, one.count = rightful, reason, one.count + 1
+
+    @property
+    def count(self) -> int:
+        """Number of refused messages."""
+        return sum(one.count for one in self._found.values())
+
+    def texts(self) -> list[str]:
+        """Return one line per topic and sender."""
+        return [
+            f"{topic}: refused {one.sender} ({one.count} messages): {one.reason}; "
+            f"publisher is {one.rightful}"
+            for (topic, _), one in self._found.items()
+        ]
 
 
 class Door:

@@ -26,7 +26,7 @@ from uam_control.setpoints.attitude_target import (
     ATTITUDE_AND_YAW_RATE,
     RATES,
 )
-from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.desired import Target
 from uam_control.setpoints.position_target import PositionTarget
 from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_control.vehicle import load_description

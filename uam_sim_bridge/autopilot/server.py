@@ -8,6 +8,10 @@ deterministic.
 With --serial, one line carries both, as on a flight controller in HITL mode; its other end is
 `uam_sim_bridge.mavlink.hil.router`. With --companion, a serial line replaces the UDP
 port alone, and the autopilot has a clock of its own.
+
+Samples of a simulator come early and late. Their times in the autopilot's clock keep the
+simulator's even spacing, and stay within WITHIN of the own clock: a simulator that stalls does not
+stop the autopilot's clock, which the companion would take for a reboot.
 """
 
 from __future__ import annotations
@@ -17,7 +21,8 @@ import math
 import signal
 import socket
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -28,7 +33,6 @@ from uam_sim_bridge import hardware_priority
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.own_clock import OwnClock
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.serial_line import CompanionLine, SerialLine
 from uam_sim_bridge.mavlink.hil.hil_messages import CONTROLS
@@ -37,11 +41,37 @@ from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 
+WITHIN = 0.02  # [s] between the time of a sample and the own clock
+FOLLOW = 0.002  # [1] part of the difference by which the times follow, per sample
+LEAST = 0.0005  # [s] between two samples
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # HIL_ACTUATOR_CONTROLS.mode
 _LATEST = 2**53  # µs, latest time: its nanoseconds still fit MAVLink's 64 bits
 _RATE_SAMPLES = 8  # number of intervals that measure the rate of HIL_SENSOR
+
+
+class OwnClock:
+    """Converts the simulator's times [s] into the autopilot's, 0 at the first sample."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """clock: own clock [s]."""
+        self._clock = clock
+        self._start: float | None = None
+        self._offset = self._last = 0.0
+
+    def time(self, simulated: float) -> float:
+        """Return the time [s] of a sample that arrives now; later than that of the one before."""
+        if self._start is None:
+            self._start, self._offset = self._clock(), -simulated
+            return 0.0
+        now = self._clock() - self._start
+        late = now - (simulated + self._offset)
+        self._offset += FOLLOW * late
+        if abs(late) > WITHIN:
+            self._offset += late - (WITHIN if late > 0.0 else -WITHIN)
+        self._last = max(self._last + LEAST, simulated + self._offset)
+        return self._last
 
 
 class Server:

@@ -13,9 +13,8 @@ from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
-from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
+from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport, LateTransport
 from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
-from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
 from uam_sim_bridge.mavlink.transport.transport import (
     Transport,
     UdpTransport,

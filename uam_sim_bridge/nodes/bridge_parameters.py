@@ -9,9 +9,9 @@ from uam_control.estimation.estimator_parameters import PoseSourceParameters
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.profiles.profile import BRIDGE, Profile
-from uam_control.setpoints.kinds.catalogue import SetpointParameters
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.setpoint_types import SetpointParameters
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.settings.names import unknown
 from uam_control.settings.parameter_file import ProfileError

@@ -15,6 +15,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -27,10 +28,13 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import ImuWriter, PoseWriter
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
+from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
@@ -41,11 +45,12 @@ from uam_sim_bridge.laboratory.person import Person
 from uam_sim_bridge.nodes import laboratory_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
-from uam_sim_bridge.nodes.laboratory_topics import DriverTopic, imu_driver, pose_driver
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.sensors import Delay
 
+IMU_DRIVER, POSE_DRIVER = "imu_driver", "pose_driver"
 NAME = "laboratory"
 READY = "ready"  # file in the folder of the devices, when they are there
 # [ticks] between two messages of rotors, payload and magnet, and looks at topics; at services
@@ -53,6 +58,41 @@ LISTEN_TICKS, SERVE_TICKS = 5, 25
 SWITCH = 0.0002  # [s] a thread of a device waits at most so long for the interpreter
 CONFIRM = "confirm"  # a step that needs it
 ASK_AGAIN = 2.0  # [s] between two confirmations of a step
+
+
+class DriverTopic:
+    """A node of its own that publishes one topic."""
+
+    def __init__(self, node: Node, name: str, topic: Topic, writer: Any, latency: int) -> None:
+        """node: in whose namespace; writer: fills the message; latency [ticks]."""
+        self._own = Node(name, namespace=node.get_namespace())
+        self._publisher = self._own.create_publisher(topic.type, topic.name, topic.qos)
+        self._writer, self._delay = writer, Delay(latency)
+
+    def publish(self, tick: int, sample: tuple | None, shift: float, plugged: bool = True) -> None:
+        """Publish the sample that is due at `tick`; sample: a new one, time [s] of the plant first.
+
+        shift [s]: from the plant's time to the system's; plugged: whether the sensor is there.
+        """
+        due = self._delay(tick, sample)
+        if due is not None and plugged:
+            time, *values = due
+            self._publisher.publish(self._writer.fill(round((time + shift) * SECOND), *values))
+
+    def close(self) -> None:
+        """Destroy the node."""
+        self._own.destroy_node()
+
+
+def imu_driver(node: Node, latency: int) -> DriverTopic:
+    """Return the driver of the companion's IMU; latency [ticks]."""
+    writer = ImuWriter(frame(node, topics.BODY))
+    return DriverTopic(node, IMU_DRIVER, topics.IMU, writer, latency)
+
+
+def pose_driver(node: Node, latency: int) -> DriverTopic:
+    """Return another's driver of the motion capture; latency [ticks] from exposure."""
+    return DriverTopic(node, POSE_DRIVER, topics.MOCAP, PoseWriter(), latency)
 
 
 @dataclass

@@ -24,7 +24,7 @@ from uam_msgs_py.node.rightful import rightful_nodes
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.laboratory.laboratory import Devices
-from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
+from uam_sim_bridge.nodes.plant_options import SimulatedParameters
 
 GPIO, AUTOPILOT, SERVO, NONE = "gpio", "autopilot", "servo", "none"
 TOPIC = "topic"

@@ -27,11 +27,11 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.pose_source import PoseSource
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence
-from uam_control.setpoints.kinds.catalogue import SETPOINTS, SetpointParameters
-from uam_control.setpoints.kinds.desired import Desired
+from uam_control.setpoints.desired import Desired
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import Setpoint, sent
+from uam_control.setpoints.setpoint_types import SETPOINTS, SetpointParameters
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterError

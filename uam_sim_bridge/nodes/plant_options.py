@@ -2,28 +2,61 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 from rclpy.node import Node
 
 from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
+from uam_control.settings.json_text import read_mapping
 from uam_control.settings.parameter_set import (
+    ParameterError,
+    ParameterSet,
     choice,
+    integer,
     number,
     switch,
     text,
+    vector,
 )
 from uam_control.settings.process_parameters import TickTimesParameters
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
-from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
+from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
+
+
+@dataclass(frozen=True)
+class SimulatedParameters(ParameterSet):
+    """The vehicle as simulated, its payload and its noise, the autopilot's port."""
+
+    vehicle_changes: str = text(
+        "{}", "dotted entries of the vehicle's file to replace", 'JSON, as {"air.gust": 1.0}'
+    )
+    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
+    seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
+    arm_start: tuple = vector(
+        (),
+        "joint angles on the ground, empty = stowed as described",
+        "rad",
+        -math.pi,
+        math.pi,
+        optional=True,
+    )
+    hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
+    statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
+
+    def changes(self) -> dict[str, Any]:
+        """Return the entries to replace, for `Vehicle.changed`; raises ParameterError."""
+        expected = 'vehicle_changes: JSON expected, as {"air.gust": 1.0}'
+        return read_mapping(self.vehicle_changes, ParameterError, expected)
 
 
 @dataclass(frozen=True)

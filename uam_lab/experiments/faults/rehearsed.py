@@ -14,9 +14,9 @@ from uam_lab.experiments.faults.trial import FaultResult
 from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
-from uam_lab.flights.rehearsal.flown_rehearsal import fly
+from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
+from uam_lab.flights.rehearsal.engine import fly
 from uam_lab.flights.rehearsal.options import RehearsalOptions
-from uam_lab.flights.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_lab.flights.vehicle.lab_settings import settings_of
 from uam_lab.records.results.outcome import Outcome

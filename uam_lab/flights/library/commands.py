@@ -6,7 +6,7 @@ import contextlib
 import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from uam_control.profiles.profile import Profile
 from uam_lab.flights.library.errors import CommandRefused, FlightError
@@ -14,6 +14,10 @@ from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.node_environment import transport_environment
 from uam_lab.flights.ros.profile_switch import ProfileSwitch, SwitchRefused
+
+if TYPE_CHECKING:
+    from geometry_msgs.msg import PoseStamped
+
 
 Changes = dict[str, dict[str, tuple[Any, Any]]]  # node → name → (old, new)
 Found = TypeVar("Found")
@@ -101,3 +105,24 @@ def _accepted(answer: tuple[bool, str]) -> str:
     if not accepted:
         raise CommandRefused(text)
     return text
+
+
+class Hand:
+    """Commands as those of `Flight`; each raises CommandRefused with the reason."""
+
+    def __init__(self, commands: Callable[[], Commands]) -> None:
+        self._commands = commands
+
+    def goto(self, x: float, y: float, z: float, yaw: float | None = None) -> str:
+        """Bring the hand to a position [m, ENU] and hold it there; yaw [rad]: heading, None: as it
+        is. Returns the answer."""
+        return self._commands().goto(x, y, z, yaw, hand=True)
+
+    def plan(self, message: Any) -> str:
+        """Fly a PoseStamped, a MultiDOFJointTrajectory or a TwistStamped of the hand."""
+        return self._commands().plan(message, hand=True)
+
+    @property
+    def pose(self) -> PoseStamped:
+        """The estimate of the hand's pose in the world."""
+        return self._commands().call(Operator.hand_pose)

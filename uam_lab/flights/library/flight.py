@@ -32,8 +32,7 @@ from uam_sim_bridge.faults import PROCESS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
 
 if TYPE_CHECKING:
-    from uam_lab.flights.library.commands import Changes, Commands
-    from uam_lab.flights.library.hand import Hand
+    from uam_lab.flights.library.commands import Changes, Commands, Hand
     from uam_lab.flights.processes.guest import Guest
 
 CONNECTED = 60.0  # [s] of wall time for the nodes to find each other before a command
@@ -302,7 +301,7 @@ class Flight:
     @property
     def hand(self) -> Hand:
         """The end effector: `flight.hand.goto(...)`, `.plan(...)`, `.pose`."""
-        from uam_lab.flights.library.hand import Hand
+        from uam_lab.flights.library.commands import Hand
 
         return Hand(self._commands)
 

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.mission.time_limit import time_limit
+from uam_lab.flights.conclude import conclude
+from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.guest import Guest
@@ -24,7 +26,6 @@ from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
 from uam_lab.flights.rehearsal.options import RehearsalOptions
-from uam_lab.flights.rehearsal.rehearsed_outcome import read_outcome
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.status_listener import StatusListener
@@ -34,12 +35,18 @@ from uam_lab.flights.vehicle.lab_settings import settings_of
 from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_engine import start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
+from uam_lab.records.recording.log_reader import read_flight
+from uam_lab.records.recording.logged_topics import Log
+from uam_lab.records.recording.mcap_reader import UnreadableLog
+from uam_lab.records.recording.node_statistics import LABORATORY_FILE, losses, statistics
+from uam_lab.records.recording.setpoint_latencies import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, write_json
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.nodes.laboratory import READY
 from uam_sim_bridge.ports import Ports, Reservation
 
+REFUSED = "start refused: "
 DEVICES, LOGS = "devices", "logs"  # in the result folder
 POLL = 0.05  # [s]
 SAY_PERIOD = 5.0  # [s] between two lines about the lists
@@ -47,6 +54,42 @@ DEVICES_WAIT = 60.0  # [s] until the laboratory has its devices
 # items about the companion of the vehicle and the pilot's radio, which a rehearsal has not
 ABSENT = {"clock_synchronised": False, "performance_governor": False, "radio": False}
 OWN = (LABORATORY, AUTOPILOT)  # their end is no refused start
+
+
+def read_outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    refused: str,
+    interrupted: bool,
+) -> Outcome:
+    """Return the outcome of the rehearsal in `folder`.
+
+    failure: the failed node, if any; refused: why the mission was not started, "" if it was.
+    """
+    outcome = Outcome(series=None, interrupted=interrupted)
+    logs = folder.path / "logs"
+    numbers = statistics(logs / LABORATORY_FILE)
+    if refused:
+        outcome.failure = REFUSED + refused
+    elif failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    outcome.wall_s = float(numbers.get("wall_s", 0.0))
+    if lost := numbers.get("lost_s"):
+        outcome.notes.append(f"the plant could not keep real time: {lost:.2f} s lost")
+    outcome.notes.extend(losses(logs))
+    try:
+        log = Log.read(folder.log)
+        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
+    except (UnreadableLog, OSError) as error:
+        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+        return outcome
+    period = settings.vehicle.control_period
+    outcome.latency_s, outcome.missed_ticks = latencies(log, period)
+    flight.tell(outcome)
+    if not flight.done and not outcome.partial:
+        outcome.failure = numbers.get("ended_by") or "the mission did not end"
+    return outcome
 
 
 class RehearsalEngine:
@@ -233,3 +276,20 @@ class RehearsalCourse:
             rehearsal.say(f"before the start: {self._said}")
         # the starter decides in a thread of its own: what ends the rehearsal is what was stored
         return vehicle and not rehearsal.refused and self._children.running(LABORATORY)
+
+
+def fly(
+    lab: Lab,
+    settings: FlightSettings,
+    options: RehearsalOptions,
+    observer: Observer,
+    stop: StopRequest,
+) -> tuple[Path, Outcome, dict[str, Any] | None]:
+    """Rehearse; return result folder, outcome and metrics, None if nothing was recorded.
+
+    Raises ResultFolderError, PortError, LabError.
+    """
+    prepare(observer.message)
+    folder = ResultFolder.create(settings.scenario.name, "rehearsal", settings.out)
+    outcome = RehearsalEngine(lab, options).fly(settings, folder, observer, stop)
+    return folder.path, outcome, conclude(settings, folder, outcome)

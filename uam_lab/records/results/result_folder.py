@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import platform
 import re
 import subprocess
 import sys
+import weakref
 from collections.abc import Mapping
 from datetime import datetime
 from importlib import metadata
@@ -18,14 +20,9 @@ from typing import Any
 import yaml
 
 from uam_lab.records.results.atomic import replacing, write_text
-from uam_lab.records.results.folder_claim import (
-    FolderClaim,
-    ResultFolderError,
-    claim,
-    claim_for_process,
-)
 from uam_lab.records.results.metrics import plain
 
+_of_process: dict[Path, FolderClaim] = {}  # claims of commands, to the end of this process
 RESULTS = Path("results")
 LATEST = "latest"
 PX4_LOG = "px4.ulg"  # of a flight with PX4 in software
@@ -42,6 +39,39 @@ DISTRIBUTIONS = (
     "pyarrow",
     "matplotlib",
 )
+
+
+class ResultFolderError(ValueError):
+    """The result folder cannot be used; the text is one line."""
+
+
+class FolderClaim:
+    """A lock (flock) of the folder itself, which needs no file. Ends with this object."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises ResultFolderError, OSError. A file system without such locks has none."""
+        opened = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        self.release = weakref.finalize(self, os.close, opened)
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.release()
+            raise ResultFolderError(
+                f"result folder {path} is in use: another flight or campaign writes to it; wait "
+                "for its end, or give another --out"
+            ) from None
+        except OSError:
+            self.release()
+
+
+def claim(path: Path) -> FolderClaim:
+    """Return a claim of the folder, that of this process if it has one."""
+    return _of_process.get(path.resolve()) or FolderClaim(path)
+
+
+def claim_for_process(path: Path) -> None:
+    """Claim the folder to the end of this process; again is allowed."""
+    _of_process[path.resolve()] = claim(path)
 
 
 class ResultFolder:

@@ -13,12 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_sim_bridge.devices.serial.bit_errors import disturbed
 from uam_sim_bridge.devices.serial.pseudo_terminal import DeviceThread, PseudoTerminal
 from uam_sim_bridge.devices.serial.serial_port import BITS_PER_BYTE
 
 IDLE = 0.02  # [s] longest wait
 HELD = 65536  # bytes under way in one direction; a UART's sender would wait
+
+
+def disturbed(data: bytes, rate: float, noise: np.random.Generator) -> bytes:
+    """Return `data` with each bit inverted with probability `rate`."""
+    if not rate or not data:
+        return data
+    flips = noise.random(8 * len(data)) < rate
+    return (np.frombuffer(data, np.uint8) ^ np.packbits(flips)).tobytes()
 
 
 class Wire:

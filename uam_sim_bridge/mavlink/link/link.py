@@ -15,7 +15,7 @@ from uam_control.offboard.autopilot_magnet import AutopilotMagnet
 from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavCmd, MavResult, Severity
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
-from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.desired import Target
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_sim_bridge.mavlink.link.flight_state import FlightState

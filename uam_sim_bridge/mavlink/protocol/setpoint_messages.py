@@ -7,7 +7,7 @@ import numpy as np
 from uam_control.frames import swap_euler, swap_world
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.setpoints.attitude_target import AttitudeTarget
-from uam_control.setpoints.kinds.desired import Target
+from uam_control.setpoints.desired import Target
 from uam_control.setpoints.position_target import (
     ACCELERATION_IGNORED,
     VELOCITY_IGNORED,

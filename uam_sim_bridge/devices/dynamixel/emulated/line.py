@@ -14,7 +14,7 @@ import numpy as np
 from uam_sim_bridge.devices.dynamixel import protocol
 from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
 from uam_sim_bridge.devices.dynamixel.protocol import BROADCAST, STATUS, Packet, PacketReader
-from uam_sim_bridge.devices.serial.bit_errors import disturbed
+from uam_sim_bridge.devices.serial.serial_cable import disturbed
 
 PING_SLOT = 0.001  # [s] between answers to a broadcast ping
 

@@ -1,1 +1,0 @@
-"""Kinds of setpoints: body rates, attitude, position, wrench."""
