@@ -254,7 +254,7 @@ def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
     while plant.time < 0.4:
         plant.sense()
         plant.step(HOVER, np.zeros(2), False)
-        efficiency[round(plant.time, 3)] = plant.inner.rotors.efficiency[0]
+        efficiency[round(plant.time, 3)] = plant.physics.rotors.efficiency[0]
     assert [efficiency[t] for t in (0.1, 0.152, 0.252, 0.4)] == [1.0, 0.15, 0.3, 1.0]
 
 
@@ -273,7 +273,7 @@ def test_wind_comes_softly_and_goes():
     while plant.time < 0.4:
         plant.sense()
         plant.step(HOVER, np.zeros(2), False)
-        winds[round(plant.time, 3)] = plant.inner.wind.copy()
+        winds[round(plant.time, 3)] = plant.physics.wind.copy()
     np.testing.assert_allclose(winds[0.1], 0.0)
     np.testing.assert_allclose(winds[0.152], [0.0, 4.0, -0.5], atol=0.3)
     np.testing.assert_allclose(winds[0.296], [0.0, 8.0, -1.0], atol=1e-9)
@@ -289,7 +289,7 @@ def test_gusts_go_on_around_the_wind_that_a_fault_adds():
     added.mission_at(0.0, 0.0, "take-off")
     run(usual, 0.4)
     run(added, 0.4)
-    np.testing.assert_allclose(added.inner.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(added.physics.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_nothing_happens_before_the_mission_begins():
@@ -308,7 +308,7 @@ def lifted(text, until=1.5):
     The magnet is on until 1 s.
     """
     faulty = plant_with(text)
-    plant = faulty.inner
+    plant = faulty.physics
     plant._alpha[:] = 0.0
     plant._swing_angle[:] = 0.0
     base = np.array([0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0])

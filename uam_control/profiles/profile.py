@@ -216,11 +216,6 @@ def _shared(
     return rows
 
 
-def own_profile(law: str, vehicle: VehicleDescription) -> str | None:
-    """Return the name of the profile that the vehicle, or the catalogue, has for `law`."""
-    return vehicle.profile(law) or catalogue.law(law).profile
-
-
 def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Profile:
     """Return the profile of `law` for flights without a named profile; raises ProfileError.
 
@@ -233,23 +228,27 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
     vehicle = vehicle or load_description()
     if not vehicle.profile(catalogue.DEFAULT):
         raise ProfileError(f"{vehicle.file}: no profile: uam vehicle design {vehicle.source}")
-    if (own := own_profile(law, vehicle)) and is_complete(law, vehicle):
-        return load_profile(own, vehicle=vehicle)
+    if complete := complete_profile(law, vehicle):
+        return load_profile(complete, vehicle=vehicle)
     sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)
     for node in CONTROLLERS:
         known = parameter_set(node, {}, vehicle)[0].specs()
         specs = parameter_set(node, {"law": law}, vehicle)[0].specs()
         shared = {k: v for k, v in sections[node].items() if specs.get(k) == known[k]}
         sections[node] = {"law": law} | shared
-    if own:
-        return load_profile(own, vehicle=vehicle, onto=sections)
+    if part := vehicle.profile(law):
+        return load_profile(part, vehicle=vehicle, onto=sections)
     return profile_of(sections, Path(f"{law}.yaml"), vehicle)
 
 
-def is_complete(law: str, vehicle: VehicleDescription) -> bool:
-    """Return whether the law's own profile stands for itself, see `default_profile`."""
-    named = law != catalogue.DEFAULT and vehicle.profile(law)
-    return bool(own_profile(law, vehicle)) and not named
+def complete_profile(law: str, vehicle: VehicleDescription) -> str:
+    """Return the name of the law's own profile that stands for itself, "" for none.
+
+    What a vehicle names for a law that is not the default one does not, see `default_profile`.
+    """
+    if (named := vehicle.profile(law)) and law != catalogue.DEFAULT:
+        return ""
+    return named or catalogue.law(law).profile
 
 
 def _file(name_or_file: str) -> Path:

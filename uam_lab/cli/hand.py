@@ -22,8 +22,13 @@ DONE, BEYOND = 0, 1
 NEAR = 1e-6  # [m] at which a place is reached
 LARGEST = 1e4  # angle of a joint, as given
 POSTURES = 20000  # of the workspace
-NEEDS = {"fk": "joints", "ik": "position"}  # options by action
-OF = {"joints": "fk", "degrees": "fk", "position": "ik", "out": "workspace"}  # actions by option
+# option → its action, and whether that needs it
+OF = {
+    "joints": ("fk", True),
+    "degrees": ("fk", False),
+    "position": ("ik", True),
+    "out": ("workspace", False),
+}
 EXAMPLES = """\
 examples:
   uam hand fk --joints 0.5,1.0                             forward kinematics, angles in radians
@@ -76,12 +81,12 @@ def angles(text: str) -> list[float]:
 
 def run(options: argparse.Namespace) -> int:
     """Print the answer; return the exit status."""
-    needed = NEEDS.get(options.action, "")
-    if needed and getattr(options, needed) is None:
-        raise SettingsError(f"{options.action} needs --{needed}")
-    for name, action in OF.items():
+    for name, (action, needed) in OF.items():
+        given = getattr(options, name)
         if action != options.action:
-            refuse_given(f"is of {action}", **{name: getattr(options, name)})
+            refuse_given(f"is of {action}", **{name: given})
+        elif needed and given is None:
+            raise SettingsError(f"{action} needs --{name}")
     _check_picture(options.out)
     vehicle = load_description(options.vehicle)
     chain = chain_of(vehicle)

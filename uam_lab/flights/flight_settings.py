@@ -14,8 +14,8 @@ from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import (
     Profile,
+    complete_profile,
     default_profile,
-    is_complete,
     load_profile,
 )
 from uam_control.profiles.profile_fit import misfits
@@ -227,7 +227,7 @@ def _profile(
         profile = default_profile(o.controller, vehicle)
     else:
         # a file may have a part of the parameters where there is no name for the others
-        own = is_complete(o.controller, vehicle)
+        own = complete_profile(o.controller, vehicle)
         profile = load_profile(
             *(str(configuration.named("profiles", str(one))) for one in o.profile),
             vehicle=vehicle,

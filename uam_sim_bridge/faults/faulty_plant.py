@@ -57,14 +57,14 @@ def _physical(faults: Schedule) -> list[str]:
 class FaultyPlant(Plant):
     """A plant with faults that begin and end at mission times; `mission_at` sets the time.
 
-    `inner`: the plant of the physics engine. `senses`, `acts`: whether it changes samples, and
+    `physics`: the plant that it changes. `senses`, `acts`: whether it changes samples, and
     commands or physics, until the next fault begins or ends.
     """
 
-    def __init__(self, inner: Plant, schedule: Schedule) -> None:
+    def __init__(self, physics: Plant, schedule: Schedule) -> None:
         """schedule: faults of the plant only."""
-        self.inner = inner
-        super().__init__(inner.vehicle)
+        self._physics = physics
+        super().__init__(physics.vehicle)
         self.senses = self.acts = False
         self.timeline = Timeline(schedule)
         self.changed: list[FaultState] = []  # faults that began or ended at this tick
@@ -75,18 +75,18 @@ class FaultyPlant(Plant):
         self._noise = [np.random.default_rng(stream) for stream in streams]
 
     @property
+    def physics(self) -> Plant:
+        """See `Plant.physics`."""
+        return self._physics
+
+    @property
     def tick(self) -> int:
         """The tick of the inner plant."""
-        return self.inner.tick
+        return self._physics.tick
 
     @tick.setter
     def tick(self, tick: int) -> None:
-        self.inner.tick = tick
-
-    @property
-    def physics(self) -> Plant:
-        """See `Plant.physics`."""
-        return self.inner
+        self._physics.tick = tick
 
     def mission_at(self, stamp: float, time: float, phase: str) -> None:
         """See `Timeline.mission_at`."""
@@ -95,12 +95,12 @@ class FaultyPlant(Plant):
     def sense(self) -> Samples:
         """Return the samples of the inner plant, changed by the active faults."""
         self._begin_and_end()
-        return self._changed(self.inner.sense())
+        return self._changed(self._physics.sense())
 
     def observe(self, row: np.ndarray) -> Samples:
         """See `Plant.observe`; the true values are those of the inner plant."""
         self._begin_and_end()
-        return self._changed(self.inner.observe(row))
+        return self._changed(self._physics.observe(row))
 
     def _begin_and_end(self) -> None:
         """Find the faults that are active at this tick."""
@@ -140,16 +140,16 @@ class FaultyPlant(Plant):
         if self.acts:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_command), bool(magnet))
             described = self.vehicle.description
-            physics = Disturbance.none(len(described.rotors), len(described.joints))
+            change = Disturbance.none(len(described.rotors), len(described.joints))
             for fault, now in self._active.values():
-                fault.act(commands, physics, now)
-            if self.inner.DISTURBABLE:
-                self.inner.disturb(physics)
+                fault.act(commands, change, now)
+            if self._physics.DISTURBABLE:
+                self._physics.disturb(change)
             motor_commands, arm_command = commands.motors, commands.effort
             magnet = commands.magnet
             self.acts = self._acting
-        self.inner.step(motor_commands, arm_command, magnet)
+        self._physics.step(motor_commands, arm_command, magnet)
 
     def truth(self) -> Truth:
         """Return the truth of the inner plant."""
-        return self.inner.truth()
+        return self._physics.truth()

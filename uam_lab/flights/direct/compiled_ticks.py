@@ -16,9 +16,9 @@ somebody's own) is a function in Python, which the loop calls in its turn.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import partial, wraps
 from operator import is_
-from typing import Protocol
+from typing import TYPE_CHECKING
 from weakref import proxy
 
 import numpy as np
@@ -27,54 +27,44 @@ from uam_control.maths.compiled import borrowing, jit, on_disk
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import put
 from uam_control.stages.bridge_stage import BridgeStage, unreported
-from uam_control.stages.control_tick import ControlTick, take_report
+from uam_control.stages.control_tick import take_report
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.signals import GRIP, IMU, JOINTS, NOTHING, PAYLOAD, POSES, SignalArrays
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
-from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
-from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
-from uam_sim_bridge.plant import PhysicsError, Plant
+from uam_lab.flights.direct.record import MOTORS, record_step
+from uam_sim_bridge.autopilot.joined import cycle_step
+from uam_sim_bridge.plant import PhysicsError
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.plant_tick import sense, step
 from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, MocapArrays
+
+if TYPE_CHECKING:
+    from uam_lab.flights.direct.flight import DirectFlight
 
 COMPILES = "compiling the direct engine for this law and vehicle (once)"
 LEAST = 2  # ticks for which the preparations are worth their time
 USUAL = {"mission": MissionStage, "bridge": BridgeStage}
 
 
-class Flight(Protocol):
-    """What the compiled ticks need of a `DirectFlight`; see there."""
+def _safely(method: Callable[..., int]) -> Callable[..., int]:
+    """Let a method keep what it raises: an error could not come out of the loop from there."""
 
-    plant: Plant
-    control: ControlTick
-    autopilot: JoinedAutopilot
-    autopilot_imu: bool
-    recorder: TickRecorder
-    say: Callable[[str], object]
-    newest: tuple[float, np.ndarray, np.ndarray]  # sample of the autopilot's IMU, see `Samples.hil`
+    @wraps(method)
+    def kept(self: CompiledTicks, argument: object) -> int:
+        try:
+            return method(self, argument)
+        except BaseException as error:
+            self._error = error
+            return ENDED
 
-    def sense(self) -> None:
-        """Take the samples of a tick."""
-
-    def resume(self) -> None:
-        """Go on after compiled ticks that have sensed last."""
-
-    def go_on(self, stage: int) -> None:
-        """Finish a tick from a number in `ControlTick.stages` on."""
-
-    def cycle(self) -> None:
-        """Run the autopilot's cycle."""
-
-    def push(self) -> None:
-        """Advance the physics."""
+    return kept
 
 
 class CompiledTicks:
     """Flies the compiled ticks of a flight; `ticks`: how many it has flown."""
 
-    def __init__(self, flight: Flight) -> None:
+    def __init__(self, flight: DirectFlight) -> None:
         self._flight, self.ticks = proxy(flight), 0  # the flight owns this object
         self._sample = np.zeros((2, 3))  # of the autopilot's IMU: gyro, specific force, FLU
         self._fault = np.zeros(1, dtype=np.int64)  # address of the text of MuJoCo's error
@@ -156,13 +146,11 @@ class CompiledTicks:
         objects = lambda: flight.sense(), lambda: flight.cycle(), lambda: flight.push()
         self._in_python = [objects[0], *runs, None, *objects[1:]]
         me = proxy(self)
-        parts = [
-            step or (lambda place=place: me._safely(me._do, place))
-            for place, step in enumerate(steps)
-        ]
-        last = Step(unreported, (control.bridge.arrays,))
-        asked = bound(*last)
-        question = (lambda: me._safely(me._may_go_on, asked)) if asks else last
+        parts = [step or (lambda place=place: me._do(place)) for place, step in enumerate(steps)]
+        question = Step(unreported, (control.bridge.arrays,))
+        if asks:
+            asked = bound(*question)
+            question = lambda: me._may_go_on(asked)  # noqa: E731
         self._steps = Steps(parts, 1 + len(stages), question)
 
     @property
@@ -278,19 +266,13 @@ class CompiledTicks:
             raise self._error
         return done, end
 
-    def _safely(self, function: Callable[..., int], argument: object) -> int:
-        """Call a function in Python; what it raises could not come out of the loop from there."""
-        try:
-            return function(argument)
-        except BaseException as error:
-            self._error = error
-            return ENDED
-
+    @_safely
     def _may_go_on(self, asked: Callable[[], int]) -> int:
         """Answer the question after a tick with a part in Python that may decide."""
         outcome = asked()
         return outcome if outcome != DONE or self._nominal() else ASK
 
+    @_safely
     def _do(self, place: int) -> int:
         """Do a part in Python; say its outcome."""
         control = self._flight.control
