@@ -21,8 +21,7 @@ from servo_shafts import StillShaft
 from uam_lab.flights.processes.process_table import nodes
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
-from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming, TrackedBody
 
 PATIENCE = 120.0  # [s]
 PLACE = np.array([0.0, 0.0, 0.2])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.finding import Finding
-from uam_lab.preflight.checklist.guided import guided
+from uam_lab.preflight.checklist.guided import ConfirmStep, KillStep, MagnetStep, guided
 from uam_lab.preflight.checklist.host import HostReader, governors
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import (
@@ -29,7 +29,6 @@ from uam_lab.preflight.checklist.observation import (
 )
 from uam_lab.preflight.checklist.samples import Sample
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
-from uam_lab.preflight.checklist.switch_steps import ConfirmStep, KillStep, MagnetStep
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message, read_items
 from uam_msgs_py.messages.status import ChecklistState, RadioState
 

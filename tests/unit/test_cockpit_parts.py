@@ -14,12 +14,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
-from uam_lab.cockpit.buttons import BUTTONS
 from uam_lab.cockpit.checklist_panel import ChecklistPanel, checklist_html
-from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
+from uam_lab.cockpit.gains import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import _facts, headline
+from uam_lab.cockpit.page import BUTTONS
 from uam_lab.cockpit.remote_parameters import About
-from uam_lab.cockpit.urdf_shapes import shapes
 from uam_lab.cockpit.vehicle_health import (
     BAD,
     CAUTION,
@@ -30,7 +29,7 @@ from uam_lab.cockpit.vehicle_health import (
     Health,
     grade,
 )
-from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView
+from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView, shapes
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import (

@@ -7,13 +7,11 @@ import pytest
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import Severity
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
-from uam_sim_bridge.mavlink.telemetry.event_messages import (
-    EventMessage,
-)
 from uam_sim_bridge.mavlink.telemetry.events import (
     HEALTH_SUMMARY,
     OFFBOARD,
     SUMMARY,
+    EventMessage,
     EventReader,
     EventTexts,
     event_id,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_lab.cockpit.frame_rate import INTERVAL, REST, SHARE, FrameRate
+from uam_lab.cockpit.cockpit_node import INTERVAL, REST, SHARE, FrameRate
 
 FASTEST, SLOWEST = 0.04, 0.5
 

@@ -7,8 +7,15 @@ import pytest
 import serial
 from set_clock import SetClock
 
-from uam_sim_bridge.laboratory.ground_station import ALTITUDE, LATITUDE, LONGITUDE, GroundStation
-from uam_sim_bridge.laboratory.hil_line import SILENT, STOPPED, HilLine
+from uam_sim_bridge.laboratory.hil_line import (
+    ALTITUDE,
+    LATITUDE,
+    LONGITUDE,
+    SILENT,
+    STOPPED,
+    GroundStation,
+    HilLine,
+)
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 

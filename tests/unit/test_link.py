@@ -19,8 +19,7 @@ from uam_sim_bridge.mavlink.link.link import UNSIGNED, OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
-from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
-from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
+from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, EventMessage, event_id
 from uam_sim_bridge.mavlink.telemetry.streams import ON_CHANGE, ONLY_COUNTED, RATES
 
 DOWN = np.array([0.0, 0.0, -9.81])

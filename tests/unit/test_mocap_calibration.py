@@ -18,8 +18,7 @@ from uam_control.maths.rotations import (
 from uam_lab.cli.main import main
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap import live, raw_log
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
-from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, TrackedBody
 from uam_sim_bridge.devices.mocap.fit import fit
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.devices.mocap.measurement import angle_between, places, still

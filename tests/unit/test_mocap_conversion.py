@@ -16,7 +16,7 @@ from uam_control.maths.rotations import (
 from uam_control.settings.configuration import ConfigurationError
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap.calibration import Calibration, conjugate, world_rotation
-from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import TrackedBody
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 
 HALF = math.sqrt(0.5)

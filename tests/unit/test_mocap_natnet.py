@@ -23,8 +23,12 @@ from uam_sim_bridge.devices.mocap import driver as driver_module
 from uam_sim_bridge.devices.mocap import natnet_messages
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer, Streaming
-from uam_sim_bridge.devices.mocap.emulated.tracked_body import TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
+    Disturbances,
+    MocapServer,
+    Streaming,
+    TrackedBody,
+)
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 from uam_sim_bridge.devices.mocap.library_source import LibrarySource
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message, serialize_message
 
-from uam_lab.records.recording.own_part import own_part
+from uam_lab.records.recording.topic_recorder import own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import OK, diagnostic
 from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message

@@ -18,11 +18,11 @@ from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
-from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import load_lab, template
-from uam_lab.records.recording.setpoint_latencies import latencies
+from uam_lab.records.recording.node_statistics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.faults import Schedule

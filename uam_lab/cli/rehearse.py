@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
     require_ros()
     from uam_lab.flights.rehearsal import device_figures
     from uam_lab.flights.rehearsal.engine import fly
-    from uam_lab.flights.rehearsal.options import RehearsalOptions
+    from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 
     lab = load_lab(options.config)
     if options.scenario:

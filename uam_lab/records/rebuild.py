@@ -13,8 +13,7 @@ from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_descri
 from uam_lab.records.recording import log_facts
 from uam_lab.records.recording.log_reader import read_flight
 from uam_lab.records.recording.logged_topics import Log
-from uam_lab.records.recording.node_statistics import LABORATORY_FILE
-from uam_lab.records.recording.setpoint_latencies import latencies
+from uam_lab.records.recording.node_statistics import LABORATORY_FILE, latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.completion import complete

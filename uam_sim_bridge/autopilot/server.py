@@ -12,12 +12,15 @@ port alone, and the autopilot has a clock of its own.
 Samples of a simulator come early and late. Their times in the autopilot's clock keep the
 simulator's even spacing, and stay within WITHIN of the own clock: a simulator that stalls does not
 stop the autopilot's clock, which the companion would take for a reboot.
+
+`SerialLine` replaces both the simulator's socket and the companion's UDP port in `Server`.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import select
 import signal
 import socket
 import sys
@@ -34,12 +37,13 @@ from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.autopilot.serial_line import CompanionLine, SerialLine
 from uam_sim_bridge.mavlink.hil.hil_messages import CONTROLS
 from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicle, fill_ports
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.transport.serial_transport import SerialTransport
+from uam_sim_bridge.mavlink.transport.transport import open_transport
 
 WITHIN = 0.02  # [s] between the time of a sample and the own clock
 FOLLOW = 0.002  # [1] part of the difference by which the times follow, per sample
@@ -49,6 +53,68 @@ _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # HIL_ACTUATOR_CONTROLS.mode
 _LATEST = 2**53  # µs, latest time: its nanoseconds still fit MAVLink's 64 bits
 _RATE_SAMPLES = 8  # number of intervals that measure the rate of HIL_SENSOR
+
+
+class SerialLine:
+    """One serial line; its loss ends the server, like a closed connection to the simulator."""
+
+    def __init__(self, place: str, codec: Codec) -> None:
+        """place: DEVICE:BAUD. Raises PortError in one line if it cannot be opened."""
+        self._transport: SerialTransport = open_transport(f"serial:{place}")
+        self._codec = codec
+        self._chunks: list[bytes] = []
+
+    def recv(self, size: int) -> bytes:
+        """Wait for bytes and return them; b"" if the line is lost. `size`: not used, see socket."""
+        while not self._chunks:
+            if self._transport.losses or not self._transport.connected:
+                return b""
+            select.select([self._transport.fileno()], [], [])
+            self._chunks = self._transport.receive()
+        return self._chunks.pop(0)
+
+    def sendall(self, frame: bytes) -> None:
+        """Send a frame; it is lost if the line's buffer is full, as on a flight controller."""
+        self._transport.send(frame)
+
+    def receive(self) -> list[Message]:
+        """Return no messages: those of the companion arrive through `recv`."""
+        return []
+
+    def send(self, messages: list[Message]) -> None:
+        """Send the messages to the companion."""
+        for message in messages:
+            self.sendall(self._codec.encode(message))
+
+    def close(self) -> None:
+        """Close the device."""
+        self._transport.close()
+
+
+class CompanionLine:
+    """A serial line to the companion alone, as TELEM2; in the place of the UDP port in `Server`.
+
+    It outlives the loss of the line: the device is opened again.
+    """
+
+    def __init__(self, place: str, codec: Codec) -> None:
+        """place: DEVICE:BAUD. Raises PortError in one line if it cannot be opened."""
+        self._transport = open_transport(f"serial:{place}")
+        self._codec, self._framer = codec, Framer(codec)
+
+    def receive(self) -> list[Message]:
+        """Return all received messages."""
+        chunks = self._transport.receive()
+        return [message for data in chunks for message in self._framer.stream(data)]
+
+    def send(self, messages: list[Message]) -> None:
+        """Send the messages; those that the line's buffer has no room for are lost."""
+        for message in messages:
+            self._transport.send(self._codec.encode(message))
+
+    def close(self) -> None:
+        """Close the device."""
+        self._transport.close()
 
 
 class OwnClock:

@@ -16,7 +16,7 @@ from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.engine import fly
-from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_lab.flights.vehicle.lab_settings import settings_of
 from uam_lab.records.results.outcome import Outcome

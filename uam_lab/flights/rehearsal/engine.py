@@ -24,8 +24,11 @@ from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
-from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
-from uam_lab.flights.rehearsal.options import RehearsalOptions
+from uam_lab.flights.rehearsal.laboratory_process import (
+    LABORATORY,
+    LABORATORY_MODULE,
+    RehearsalOptions,
+)
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.status_listener import StatusListener
@@ -38,8 +41,12 @@ from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
 from uam_lab.records.recording.log_reader import read_flight
 from uam_lab.records.recording.logged_topics import Log
 from uam_lab.records.recording.mcap_reader import UnreadableLog
-from uam_lab.records.recording.node_statistics import LABORATORY_FILE, losses, statistics
-from uam_lab.records.recording.setpoint_latencies import latencies
+from uam_lab.records.recording.node_statistics import (
+    LABORATORY_FILE,
+    latencies,
+    losses,
+    statistics,
+)
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, write_json
 from uam_msgs_py.node import wiring

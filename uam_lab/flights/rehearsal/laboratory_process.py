@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,10 @@ from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.rehearsal.emulated_lab import MAGNET_LINE, baud_of
-from uam_lab.flights.rehearsal.options import RehearsalOptions
 from uam_lab.flights.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.records.recording.node_statistics import LABORATORY_FILE
-from uam_sim_bridge.faults import CABLE
+from uam_sim_bridge.faults import CABLE, Schedule
 from uam_sim_bridge.laboratory.laboratory import SERIAL_FAR, USB
 from uam_sim_bridge.nodes.laboratory_options import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.ports import Ports
@@ -33,6 +33,26 @@ PX4 = "uam_sim_bridge.px4.hitl"
 PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them
 REQUIRED, IN_THE_LOOP = "px4/vehicle.yaml", "px4_parameters.yaml"  # in config/, in the logs
 GRIPPER_ON, GRIPPER_OFF = 1.0, -1.0  # outputs of a closed and an open gripper
+
+
+@dataclass(frozen=True)
+class RehearsalOptions:
+    """seed: of all noise; payload_mass [kg]; vehicle_changes: of the plant, effects
+    too; faults: of cables.
+
+    arm_start (n,) [rad]: joint angles on the ground, () for stowed; checklist: whether the lists
+    are required and a person does them; px4: a build without lockstep
+    that flies in the stand-in's place, px4_params: NAME=VALUE for it.
+    """
+
+    seed: int = 1
+    payload_mass: float = 0.0
+    vehicle_changes: Mapping[str, object] = field(default_factory=dict)
+    faults: Schedule = Schedule()
+    arm_start: tuple[float, ...] = ()
+    checklist: bool = True
+    px4: Px4Installation | None = None
+    px4_params: tuple[str, ...] = ()
 
 
 def parameters(

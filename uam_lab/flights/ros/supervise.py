@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
+
+from rclpy.node import Node
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.flight_settings import FlightSettings
@@ -17,15 +20,72 @@ from uam_lab.flights.processes.process_table import await_orphans
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.processes.shared_memory import shortage
 from uam_lab.flights.ros import FORKER, node_arguments
-from uam_lab.flights.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flights.ros.status_listener import StatusListener
 from uam_lab.records.results.result_folder import ResultFolder
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.status import WARN, diagnostic
 from uam_msgs_py.node import wiring
+from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.namespace import prefix
+from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_sim_bridge.ports import Ports
 
 RESTARTS = 3  # of each node that may be restarted, in a flight
 POLL = 0.05  # [s]
+
+
+class ChangedParameters:
+    """Subscription to /uam/parameter_changes; polled, so it needs no executor."""
+
+    def __init__(self, node: Node, door: Door) -> None:
+        """door: of the node."""
+        self._subscription, self._door = listen(node, topics.CHANGES), door
+        self._namespace = node.get_namespace()
+        self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
+
+    def poll(self) -> None:
+        """Store the received changes; only those that the node itself has sent."""
+        own = prefix(self._namespace)
+        for _, change in self._door.decoded(self._subscription, ParameterChange.from_message):
+            # another sender could end the restart by an argument that the node refuses
+            if self._door.sender(self._subscription) == f"/{own}{change.node}":
+                self.note(change)
+
+    def note(self, change: ParameterChange) -> None:
+        """Store a change if it was accepted."""
+        if change.accepted:
+            values = {name: new for name, (_, new) in change.values.items()}
+            self._newest.setdefault(change.node, {}).update(values)
+
+    def arguments(self, node: str) -> list[str]:
+        """Return the ROS arguments with a node's newest values, to append to its arguments.
+
+        Each value is given twice: that of a named node goes before the node's section of a
+        parameter file, but ROS applies it only without a namespace.
+        """
+        values = self._newest.get(node, {}).items()
+        pairs = [
+            f"{to}{name}:={json.dumps(new)}" for name, new in values for to in ("", f"{node}:")
+        ]
+        return [text for pair in pairs for text in ("-p", pair)]
+
+
+class RestartTopic:
+    """Publishes a restart on /uam/restarts and /diagnostics, for plant, log and displays."""
+
+    def __init__(self, node: Node) -> None:
+        self._prefix = prefix(node.get_namespace())
+        self._restarts, self._diagnostics = (
+            node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
+        )
+
+    def publish(self, stamp: int, node: str, text: str) -> None:
+        """Publish the restart of `node`; stamp [ns]: of the flight's clock."""
+        self._restarts.publish(diagnostic(stamp, node, WARN, text, {}))
+        self._diagnostics.publish(diagnostic(stamp, self._prefix + node, WARN, text, {}))
 
 
 class Course(Protocol):

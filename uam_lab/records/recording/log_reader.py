@@ -28,7 +28,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.records.recording import fault_records as fault_log
 from uam_lab.records.recording.logged_topics import ADAPTATION, Log, StampedRows
 from uam_lab.records.recording.mcap_reader import UnreadableLog
-from uam_lab.records.recording.setpoint_latencies import latencies
+from uam_lab.records.recording.node_statistics import latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.outcome import Outcome, grasp_decision, transition
 from uam_lab.records.results.timeseries import (

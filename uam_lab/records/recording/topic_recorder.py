@@ -12,6 +12,9 @@ Log time is simulation time: the stamp in the header. For types without a header
 /diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
 before the message. Publish time is the publisher's wall clock. On hardware, without /clock, both
 are wall time.
+
+`/tf`, `/tf_static`, `/diagnostics` and `/rosout` have no namespace. The log of a vehicle in one
+keeps the frames, status names and loggers of its namespace.
 """
 
 from __future__ import annotations
@@ -22,26 +25,64 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 
 from uam_lab.records.recording.bag import BagTopic, add_topic, write_metadata
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_lab.records.recording.core_offers import CoreOffers
-from uam_lab.records.recording.own_part import Filter, own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import deserialized, type_name
-from uam_msgs_py.messages.transforms import read_transforms
+from uam_msgs_py.messages.transforms import read_transforms, transforms_message
 from uam_msgs_py.node.door import Door
-from uam_msgs_py.node.namespace import expanded
+from uam_msgs_py.node.namespace import expanded, prefix
 from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.sole_publisher import UNKNOWN, publishers
 from uam_msgs_py.node.taking import Taker
 
+# a serialized message → the part to keep, None: nothing; raises BadMessage
+Filter = Callable[[bytes], bytes | None]
 DEPTH = 2000  # queue length per topic: 8 s at control rate
+
+
+def own_part(topic: topics.Topic, namespace: str) -> Filter | None:
+    """Return the filter of a topic for a vehicle; None where every message is its own."""
+    own = prefix(namespace)
+    chosen = {
+        topics.TF: _frames,
+        topics.TF_STATIC: _frames,
+        topics.DIAGNOSTICS: _statuses,
+        topics.ROSOUT: _lines,
+    }.get(topic)
+    return None if chosen is None or not own else lambda data: chosen(data, own)
+
+
+def _frames(data: bytes, own: str) -> bytes | None:
+    every = read_transforms(data)
+    kept = [one for one in every if one.parent.startswith(own) or one.child.startswith(own)]
+    if len(kept) == len(every):
+        return data
+    return transforms_message(kept) if kept else None
+
+
+def _statuses(data: bytes, own: str) -> bytes | None:
+    message = deserialized(data, DiagnosticArray)
+    kept = [status for status in message.status if status.name.startswith(own)]
+    if len(kept) == len(message.status):
+        return data
+    message.status = kept
+    return serialize_message(message) if kept else None
+
+
+def _lines(data: bytes, own: str) -> bytes | None:
+    """Keep the lines of loggers such as `uav1.mission`."""
+    return data if deserialized(data, Log).name.startswith(own.replace("/", ".")) else None
 
 
 def begins_with_stamp(message_type: type) -> bool:

@@ -8,6 +8,9 @@ of the others. PX4 sends the arming checks as one report:
 
 A check lists the modes that it concerns, but some checks list all modes and block none. The reader
 therefore returns checks only if the summary excludes arming in OFFBOARD.
+
+MAVLink marks EVENT as work in progress, so pymavlink omits it; it is added to the dialect on
+import. PX4 reports most failed arming checks only as EVENT.
 """
 
 from __future__ import annotations
@@ -15,10 +18,12 @@ from __future__ import annotations
 import struct
 from typing import Any
 
+from pymavlink.dialects.v20 import development as mavlink2
+
 from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.offboard.modes import Severity
-from uam_sim_bridge.mavlink.telemetry.event_messages import ARGUMENTS, EventMessage
 
+ARGUMENTS = 40  # bytes
 OFFBOARD = 1 << 14  # PX4's navigation_mode_group of OFFBOARD
 _AUTOPILOT = 1 << 24  # component of the event's name
 SUMMARY, HEALTH_SUMMARY = "commander_arming_check_summary", "commander_health_summary"
@@ -26,6 +31,80 @@ SUMMARY, HEALTH_SUMMARY = "commander_arming_check_summary", "commander_health_su
 # PX4 lists all modes for these checks; they block OFFBOARD only from severity ERROR on
 _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 _RAISED = {"commander_rc_override", "failsafe_rc_override"}  # severity INFO in PX4, WARNING here
+
+
+class EventMessage(mavlink2.MAVLink_message):
+    """EVENT; `arguments`: up to ARGUMENTS bytes; decoding removes trailing zeros."""
+
+    id = 410
+    msgname = "EVENT"
+    fieldnames = [
+        "destination_component",
+        "destination_system",
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "log_levels",
+        "arguments",
+    ]
+    ordered_fieldnames = [
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "destination_component",
+        "destination_system",
+        "log_levels",
+        "arguments",
+    ]
+    fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: dict[str, str] = {}
+    fieldenums_by_name: dict[str, str] = {}
+    fieldunits_by_name: dict[str, str] = {"event_time_boot_ms": "ms"}
+    native_format = bytearray(b"<IIHBBBB")
+    orders = [3, 4, 0, 1, 2, 5, 6]
+    lengths = [1, 1, 1, 1, 1, 1, ARGUMENTS]
+    array_lengths = [0, 0, 0, 0, 0, 0, ARGUMENTS]
+    crc_extra = 160
+    unpacker = struct.Struct(f"<IIHBBB{ARGUMENTS}s")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(
+        self,
+        destination_component: int,
+        destination_system: int,
+        id: int,
+        event_time_boot_ms: int,
+        sequence: int,
+        log_levels: int,
+        arguments: bytes,
+    ):
+        super().__init__(EventMessage.id, EventMessage.msgname)
+        self._fieldnames = EventMessage.fieldnames
+        self._instance_field, self._instance_offset = None, -1
+        self.destination_component = destination_component
+        self.destination_system = destination_system
+        self.event = id  # not `self.id`: that is the message id
+        self.event_time_boot_ms = event_time_boot_ms
+        self.sequence = sequence
+        self.log_levels = log_levels
+        self.arguments = arguments
+
+    def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
+        """Return the frame."""
+        payload = self.unpacker.pack(
+            self.event,
+            self.event_time_boot_ms,
+            self.sequence,
+            self.destination_component,
+            self.destination_system,
+            self.log_levels,
+            self.arguments,
+        )
+        return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+
+
+mavlink2.mavlink_map.setdefault(EventMessage.id, EventMessage)
 
 
 def event_id(name: str) -> int:

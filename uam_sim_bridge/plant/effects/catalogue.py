@@ -10,15 +10,17 @@ from uam_sim_bridge.plant.effects.effect import Effect
 from uam_sim_bridge.plant.effects.ground_effect import GroundEffect
 from uam_sim_bridge.plant.effects.joint_gear import JointGear
 from uam_sim_bridge.plant.effects.joint_readings import JointReadings
-from uam_sim_bridge.plant.effects.mass_mismatch import MassMismatch
+from uam_sim_bridge.plant.effects.mismatches import (
+    MassMismatch,
+    MocapFeed,
+    RotorMismatch,
+    RotorSpread,
+)
 from uam_sim_bridge.plant.effects.mocap_dropouts import MocapDropouts
-from uam_sim_bridge.plant.effects.mocap_feed import MocapFeed
 from uam_sim_bridge.plant.effects.mocap_jitter import MocapJitter
 from uam_sim_bridge.plant.effects.network_delay import NetworkDelay
 from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 from uam_sim_bridge.plant.effects.propeller_vibration import PropellerVibration
-from uam_sim_bridge.plant.effects.rotor_mismatch import RotorMismatch
-from uam_sim_bridge.plant.effects.rotor_spread import RotorSpread
 from uam_sim_bridge.plant.effects.servo_noise import ServoNoise
 from uam_sim_bridge.plant.effects.standing_load import StandingLoad
 from uam_sim_bridge.plant.effects.thrust_fade import ThrustFade
