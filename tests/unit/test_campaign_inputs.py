@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
+from uam_lab.cli import faults
 from uam_lab.cli.campaign import usual_ranges
+from uam_lab.cli.command import given_profile
+from uam_lab.cli.parser import parsed
 from uam_lab.experiments.trials.inputs import inputs
 
 
@@ -64,3 +68,24 @@ def test_gains_options_and_code_are_inputs():
 )
 def test_the_ranges_are_those_of_the_plant_if_it_has_some(presets, ranges):
     assert usual_ranges(presets) == ranges
+
+
+@pytest.mark.parametrize("command", ["campaign", "faults", "margins", "tune"])
+def test_a_later_profile_overrides_an_earlier_one(command):
+    """config/profiles/hand.yaml has a hand_bandwidth of 4 rad/s and nothing else."""
+    options = parsed([command, "--profile", "s500", "--profile", "hand"])
+    profile = given_profile(options.profile, load_description())
+    assert profile.name == "s500+hand"
+    assert profile.sets["arm_controller"].hand_bandwidth == 4.0
+    alone = given_profile(["s500"], load_description()).sets
+    assert profile.sets["position_controller"] == alone["position_controller"]
+
+
+def test_the_command_that_flies_a_cell_again_has_each_option_once_per_value():
+    words = ["faults", "--profile", "s500", "--profile", "hand", "--plant-preset", "laboratory"]
+    options = parsed([*words, "--seed", "3", "--vehicle", "s500_arm"])
+    again = faults._again(options, SimpleNamespace(scenario="hover"))
+    assert again == (
+        "uam fly --engine direct --scenario hover --seed 3 --vehicle s500_arm "
+        "--profile s500 --profile hand --plant-preset laboratory"
+    )

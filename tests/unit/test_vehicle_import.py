@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import struct
 
 import mujoco
@@ -16,6 +17,7 @@ from uam_control.vehicle import load_description
 from uam_lab.cli.parser import parsed, run
 from uam_lab.importing import importer
 from uam_lab.importing.answers import Answers, read_answers
+from uam_lab.importing.picture import bounds
 from uam_lab.importing.source import ImportRefused
 from uam_lab.importing.structure import Chosen
 from uam_sim_bridge.plant import Vehicle
@@ -99,6 +101,24 @@ def test_it_stands_on_its_feet(tmp_path, what):
     end = plant.truth()
     assert end.state[0, 2] == pytest.approx(start.state[0, 2] - 0.005, abs=0.003)
     assert abs(end.quaternion[0]) > 0.9998
+
+
+def test_an_arm_whose_meshes_are_missing_is_above_the_feet_and_shown(tmp_path):
+    """Without shapes nothing but joints and tool says where the arm is: all above the feet, and a
+    bar from each joint to the next place."""
+    text = re.sub(r"<(visual|collision)>.*?</\1>", "", drone(), flags=re.DOTALL)
+    made, model = imported(tmp_path, text)
+    joints = made.description.joint_names
+    here = posed(model, joints, [one.stowed for one in made.description.joints])
+    feet = min(here.geom(f"foot_{i}").xpos[2] for i in range(1, 5)) - 0.012
+    heights = [here.joint(one).xanchor[2] for one in joints] + [here.body("magnet").xpos[2]]
+    assert min(heights) - feet >= 0.03 - 1e-6  # clearance of config/import/assumed.yaml
+    bars = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.jnt_bodyid[1]]
+    assert [model.geom_type[g] for g in bars] == [mujoco.mjtGeom.mjGEOM_CAPSULE]
+    ends = here.joint(joints[0]).xanchor, here.joint(joints[1]).xanchor
+    assert here.geom_xpos[bars[0]] == pytest.approx((ends[0] + ends[1]) / 2, abs=1e-6)
+    middle, radius = bounds(model, here)
+    assert np.linalg.norm(here.body("magnet").xpos - middle) < radius < 1.0
 
 
 def test_rotors_of_a_coaxial_octocopter_turn_against_each_other(tmp_path):
@@ -399,6 +419,23 @@ def test_an_mjcf_tells_thrust_and_turns_by_its_actuators(tmp_path):
     here = posed(model, ("shoulder",), (0.0,))
     assert here.joint("shoulder").xanchor - here.body("base").xpos == pytest.approx((0, 0, -0.04))
     assert here.body("magnet").xpos - here.body("base").xpos == pytest.approx((0, 0, -0.17))
+
+
+@pytest.mark.parametrize("inertial", [True, False])
+def test_a_missing_mesh_of_an_mjcf_is_left_out_where_the_body_has_its_own_mass(tmp_path, inertial):
+    """With its default flags a mesh collides, and makes the mass of a body without one."""
+    body = '<body name="x2" pos="0 0 0.1">'
+    assert body in MJCF
+    mesh = '<asset><mesh name="hull" file="hull.stl"/></asset><worldbody>'
+    given = MJCF.replace("<worldbody>", mesh, 1)
+    own = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/>' if inertial else ""
+    given = given.replace(body, f'{body}{own}<geom type="mesh" mesh="hull"/>', 1)
+    if inertial:
+        made, _ = imported(tmp_path, given, "x2.xml")
+        assert any("hull.stl is missing: not shown" in one for one in made.missing)
+    else:
+        with pytest.raises(ImportRefused, match=r"x2.xml line \d+: mesh .*hull.stl is missing"):
+            imported(tmp_path, given, "x2.xml")
 
 
 def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):

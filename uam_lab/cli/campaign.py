@@ -137,7 +137,7 @@ def _again(options: argparse.Namespace) -> str:
     words = ["uam", "campaign", "--flights", str(options.flights), "--seed", str(options.seed)]
     words += ["--vehicle", options.vehicle, "--scenario", options.scenario]
     words += ["--ranges", options.ranges]
-    words += ["--profile", options.profile] if options.profile else []
+    words += [word for one in options.profile for word in ("--profile", one)]
     words += [word for one in options.plant_preset for word in ("--plant-preset", one)]
     words += [word for one in options.effects for word in ("--effect", one)]
     return shlex.join(words)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -172,7 +172,8 @@ class Command:
 
     def profile(self) -> None:
         """Add --profile, for `given_profile`."""
-        self.option("--profile", "NAME|FILE", "(default: the vehicle's)")
+        text = "a later one overrides (default: the vehicle's)"
+        self.repeated("--profile", "NAME|FILE", text)
 
     def plant(self) -> None:
         """Add --plant-preset and --effect."""
@@ -250,14 +251,15 @@ def chosen_flight(options: argparse.Namespace) -> tuple[int | None, str]:
     return flight.domain, namespace or flight.namespace
 
 
-def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Profile:
-    """Return the profile of --profile; None: the vehicle's for the default law.
+def given_profile(names_or_files: Sequence[str], vehicle: VehicleDescription) -> Profile:
+    """Return the profile of --profile, merged; of none: the vehicle's for the default law.
 
     Raises ConfigurationError, ProfileError.
     """
-    if name_or_file is None:
+    if not names_or_files:
         return default_profile(catalogue.DEFAULT, vehicle)
-    return load_profile(str(configuration.named("profiles", name_or_file)), vehicle=vehicle)
+    files = (str(configuration.named("profiles", one)) for one in names_or_files)
+    return load_profile(*files, vehicle=vehicle)
 
 
 def chosen_effects(options: argparse.Namespace) -> Effects:

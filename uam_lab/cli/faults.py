@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -155,11 +156,15 @@ def _again(options: argparse.Namespace, matrix: Matrix) -> str:
         "scenario": matrix.scenario,
         "seed": options.seed,
         "vehicle": options.vehicle,
-        "profile": options.profile,
-        "plant-preset": options.plant_preset,
     }
     chosen = [f"--{name} {value}" for name, value in named.items() if value is not None]
-    return " ".join(["uam fly", *chosen, *(f"--effect {one}" for one in options.effects or ())])
+    lists = {
+        "profile": options.profile,
+        "plant-preset": options.plant_preset,
+        "effect": options.effects,
+    }
+    several = (f"--{name} {shlex.quote(one)}" for name, values in lists.items() for one in values)
+    return " ".join(["uam fly", *chosen, *several])
 
 
 class _Prepared(NamedTuple):

@@ -7,10 +7,8 @@ import time
 from pathlib import Path
 
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import default_profile, load_profile
-from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, Subcommands, number
+from uam_lab.cli.command import Command, Subcommands, given_profile, number
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -43,7 +41,7 @@ def add(commands: Subcommands) -> None:
         "attitude, position, joints.",
         EXAMPLES,
     )
-    command.repeated("--profile", "NAME|FILE", "a later one overrides (default: the vehicle's)")
+    command.profile()
     command.vehicle()
     command.scenario()
     mass = number("mass", "kg", 0.0)
@@ -68,10 +66,7 @@ def run(options: argparse.Namespace) -> int:
     from uam_sim_bridge.plant import Vehicle
 
     described = load_description(options.vehicle)
-    given = [str(configuration.named("profiles", one)) for one in options.profile]
-    profile = (
-        load_profile(*given, vehicle=described) if given else default_profile("modular", described)
-    )
+    profile = given_profile(options.profile, described)
     vehicle = Vehicle.of(described)
     joints = len(described.joints)
     if options.arm is not None and len(options.arm) != joints:

@@ -53,8 +53,8 @@ def add(commands: Subcommands) -> None:
     command.option("--controller", "NAME", text, catalogue.DEFAULT)
     command.option("--space", "FILE", "file with another space")
     command.vehicle()
-    text = "start of the search (default: the vehicle's profile for the controller)"
-    command.option("--profile", "NAME|FILE", text)
+    text = "start of the search, a later one overrides (default: the vehicle's for the controller)"
+    command.repeated("--profile", "NAME|FILE", text)
     command.plant()
     text = "total number of evaluations of the study"
     command.option("--evaluations", "N", text, 200, type=count)

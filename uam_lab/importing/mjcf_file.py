@@ -73,7 +73,8 @@ def _leave_out(source: Source, name: str, file: Path) -> None:
     where = source.lines.get(("mesh", name), str(source.file))
     for geom in list(source.spec.geoms):
         if geom.meshname == name:
-            if geom.contype or geom.conaffinity:
+            counts = geom.mass != 0.0 and not geom.parent.explicitinertial
+            if counts and (geom.contype or geom.conaffinity):
                 raise ImportRefused(f"{where}: mesh {file} is missing")
             source.spec.delete(geom)
     source.spec.delete(source.spec.mesh(name))

@@ -29,6 +29,7 @@ KINDS = {
 END_EFFECTOR = "end_effector"  # its site, without a magnet
 NOTHING = 1e-12  # what rounding leaves of a zero
 BOOM, LEG = "0.010", "0.006"  # [m] radius
+SHORT = 1e-3  # [m] of a bar that is left out
 HIDDEN = "3"  # geom group that is not drawn
 
 
@@ -118,12 +119,20 @@ class MjcfText:
         seen = geometry.shapes(self.parts, link, False) or solid
         for geom in seen:
             self._shown(body, link, geom)
-        if not seen and link == 0:
-            for rotor in self.parts.rotors:
-                self._bar(body, [*centre, *rotor.position], BOOM)
+        for begin, end, radius in () if seen else self._bars(link, centre):
+            self._bar(body, [*begin, *end], radius)
         if 0 < link < len(self.parts.joints):  # the last one would touch what the magnet holds
             for geom in solid:
                 self._solid(body, link, geom)
+
+    def _bars(self, link: int, centre: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, str]]:
+        """Return what is seen of a link without shapes: begin, end (3,) [m], radius of each bar."""
+        parts = self.parts
+        if link == 0:
+            return [(centre, rotor.position, BOOM) for rotor in parts.rotors]
+        last = link == len(parts.joints)
+        end = geometry.tip(parts)[0] if last else self._in(link, *parts.frame(link + 1))[0]
+        return [(np.zeros(3), end, BOOM)] if np.linalg.norm(end) > SHORT else []
 
     def _in(self, link: int, place: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return a place (3,) [m] and axes (3, 3) of the world in the frame of a link."""

@@ -9,10 +9,18 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import mujoco
 
 PLATFORMS = ("egl", "osmesa")  # tried where MUJOCO_GL names none
 SIZE = (480, 720)  # height, width [pixels]
 LIMIT = 60.0  # [s]
+AWAY = 2.9  # distance of the camera, per radius of the vehicle: all of it is in the picture
+NEAREST = 0.1  # what is nearer is not drawn, per distance of the camera
 
 
 def draw(vehicle: Path, picture: Path) -> str:
@@ -35,21 +43,28 @@ def draw(vehicle: Path, picture: Path) -> str:
     return f"no renderer: {', '.join(PLATFORMS)} failed; uam doctor says why"
 
 
+def bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, float]:
+    """Return middle (3,) [m] and radius [m] of a ball around every shape of the vehicle."""
+    geoms = np.flatnonzero(model.body_rootid[model.geom_bodyid] == model.body("base").id)
+    here, reach = data.geom_xpos[geoms], model.geom_rbound[geoms, None]
+    middle = ((here - reach).min(axis=0) + (here + reach).max(axis=0)) / 2.0
+    return middle, float((np.linalg.norm(here - middle, axis=1) + reach[:, 0]).max())
+
+
 def main(name: str, file: str) -> None:
     """Write the picture in this process."""
     os.environ.setdefault("MUJOCO_GL", PLATFORMS[0])
     import mujoco
-    import numpy as np
     from PIL import Image
 
     from uam_sim_bridge.plant import Vehicle
     from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
     plant = MujocoPlant(Vehicle.load(name).changed({"environment": []}), 0.0, seed=1)
-    apart = [np.linalg.norm(one.position) for one in plant.vehicle.description.rotors]
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = (0.0, 0.0, 0.6 * plant.data.qpos[2])
-    camera.distance, camera.azimuth, camera.elevation = 0.25 + 4.1 * max(apart), 145.0, -18.0
+    camera.lookat[:], around = bounds(plant.model, plant.data)
+    camera.distance, camera.azimuth, camera.elevation = AWAY * around, 145.0, -18.0
+    plant.model.vis.map.znear = NEAREST * camera.distance / plant.model.stat.extent
     with mujoco.Renderer(plant.model, *SIZE) as renderer:
         renderer.update_scene(plant.data, camera)
         Image.fromarray(renderer.render()).save(file)

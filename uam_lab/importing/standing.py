@@ -148,10 +148,12 @@ def _boxes(parts: Parts) -> list[tuple[int, np.ndarray]]:
 
 
 def _bottom(parts: Parts, boxes: list[tuple[int, np.ndarray]]) -> float:
-    """Return the height [m] of the arm's lowest point in the base's frame, magnet included."""
+    """Return the height [m] of the arm's lowest point in the base's frame, magnet included; of a
+    link without shapes its joint."""
     data, (origin, axes) = parts.data, parts.frame(0)
     place, last = geometry.tip(parts)[0], parts.frame(len(parts.joints))
     heights = [float((last[0] + last[1] @ place - origin) @ axes[:, 2]) - FACE]
+    heights += _in_base(parts, data.xanchor[list(parts.joints)])[:, 2].tolist()
     for body, points in boxes:
         turned = points @ data.xmat[body].reshape(3, 3).T + data.xpos[body] - origin
         heights.append(float((turned @ axes[:, 2]).min()))

@@ -17,7 +17,7 @@ class RotorMismatch(Effect):
     """Thrust, reaction torque, lags and idle speed of the rotors are not the vehicle file's."""
 
     SOURCE: ClassVar[str] = (
-        "six flights and a thrust stand of the T650, FSC-Lab: thrust 0.93 to 1.04 of what its "
+        "six flights and a thrust stand of the T650, FSC-Lab: thrust 0.946 to 1.011 of what its "
         "allocator believes, reaction torque / thrust 0.76 of it [fit, wb 1.1-1.6]"
     )
 
