@@ -16,6 +16,7 @@ import mujoco
 import yaml
 
 from uam_control.settings import configuration
+from uam_sim_bridge.plant.effects.presets import Effects
 
 MAGNET = 0.07  # [kg] of parts/magnet.xml
 INERTIA = 0.16, 0.18, 0.24  # of the body, parts of mass radius^2
@@ -26,6 +27,20 @@ PAYLOAD = 0.05  # of the mass
 AXES = {"x": "1 0 0", "y": "0 -1 0", "z": "0 0 1"}  # of a roll, pitch and yaw joint
 PICK = "pick"
 SCENARIO_NAMES = ("hover", "circle", "arm motions", PICK)
+S500 = 2.2, 0.242, 3.0  # mass [kg], radius [m], stall torque [N m] for which effects have numbers
+# exponents of mass, radius and torque by which an effect's number grows; a rotor of mass radius^3
+# that is balanced to the same grade, imbalance times speed, has an imbalance of radius^4
+GROWS = {
+    ("mass_mismatch", "shift"): (0, 1, 0),
+    ("standing_load", "force"): (1, 0, 0),
+    ("standing_load", "torque"): (1, 1, 0),
+    ("propeller_vibration", "imbalance"): (0, 4, 0),
+    ("battery_sag", "capacity"): (1, 0, 0),
+    ("battery_sag", "resistance"): (-1, 0, 0),
+    ("battery_sag", "electronics"): (1, 0, 0),
+    ("servo_noise", "torque"): (0, 0, 1),
+    ("cable_torque", "stiffness"): (0, 0, 1),
+}
 STAND, GRIP, SET_DOWN = 0.789, 0.767, 0.10  # [m] of config/environment.yaml; face above the mat
 
 
@@ -100,6 +115,20 @@ def scenarios(made: Made, folder: Path) -> dict[str, Path]:
     for name, values in zip(SCENARIO_NAMES, flown, strict=True):
         found[name] = folder / f"{made.name}_{name.replace(' ', '_')}.yaml"
         found[name].write_text(yaml.safe_dump({"description": f"{name}."} | values))
+    return found
+
+
+def grown(made: Made, effects: Effects) -> Effects:
+    """Return effects whose numbers are those of an S-500 for the vehicle, by similarity."""
+    sizes = made.mass, made.radius, _stall(made)
+    ratios = [one / of for one, of in zip(sizes, S500, strict=True)]
+    found = {name: dict(values) for name, values in effects.items()}
+    for (name, parameter), powers in GROWS.items():
+        if name in found:
+            factor = math.prod(one**power for one, power in zip(ratios, powers, strict=True))
+            value = found[name][parameter]
+            many = isinstance(value, list)
+            found[name][parameter] = [factor * one for one in value] if many else factor * value
     return found
 
 

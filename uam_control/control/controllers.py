@@ -37,6 +37,7 @@ from uam_control.control.output_limits import (
     PositionLimits,
 )
 from uam_control.control.sample_hold import SampleHold
+from uam_control.control.slow_rotors import MEMORY, SlowRotors
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
@@ -158,6 +159,7 @@ class PositionController(Controller):
     def __init__(self, parameters: PositionLimits) -> None:
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
         self._integral = np.zeros(3)
+        self._thrust, self._lift = np.full(1, math.nan), record(*MEMORY)
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> PositionArrays:
@@ -177,7 +179,12 @@ class PositionController(Controller):
         )
         filtered = float(cutoff), desired.filter, desired.lead, desired.value
         carried = self.law.bias, self._integral
-        arrays = PositionArrays(of_all, completion, carried, p.bias_frame == HEADING, *filtered)
+        rotors = SlowRotors(
+            *(float(p.rotor_lag), float(p.thrust_response), float(p.lift_rate)),
+            *(float(p.lift_most), self._thrust, self._lift),
+        )
+        turning = p.bias_frame == HEADING
+        arrays = PositionArrays(of_all, completion, carried, rotors, turning, *filtered)
         rows = self._errors
         self._begin = bound(begin_law, of_all, rows, rows, desired.value, True)
         self._end = bound(end_position, arrays, rows, 0.0)
@@ -191,6 +198,15 @@ class PositionController(Controller):
     def _forget(self) -> None:
         super()._forget()
         self._integral[:] = 0.0
+
+    def _handed_back(self, reference: np.ndarray) -> bool:
+        begins = not self.flying
+        in_flight = super()._handed_back(reference)
+        if begins:
+            self._thrust[:] = math.nan
+            grounded = not in_flight and self._parameters.lift_rate > 0.0
+            self._lift[0] = grounded, 0.0, 0.0
+        return in_flight
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float

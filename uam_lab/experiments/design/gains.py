@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.control.output_limits import RateLimits
-from uam_control.coordinates import ROLL, YAW
+from uam_control.coordinates import ROLL, YAW, Z
 from uam_control.laws import lyapunov
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
@@ -62,20 +62,35 @@ def sections(
 ) -> dict[str, dict[str, Any]]:
     """Return the sections of the profile by node, without `delay_margin`."""
     fixed = read_sections(configuration.path("design/profile.yaml"))
-    position = _position(described, found, criteria, fixed["position_controller"])
+    position = _position(described, facts, found, criteria, fixed["position_controller"])
     own = {
         "position_controller": position,
         "attitude_controller": _attitude(facts, found, criteria, fixed["attitude_controller"]),
         "arm_controller": _arm(facts, found, criteria, fixed["arm_controller"]),
         "state_estimator": estimator(described, criteria),
         "mission": _mission(described, found, position["tilt_max"]),
-        "mavlink_bridge": _bridge(described, facts, criteria),
+        "mavlink_bridge": _bridge(described, facts, found, criteria),
     }
     return {node: fixed.get(node, {}) | values for node, values in own.items()}
 
 
+def thrust_response(
+    described: VehicleDescription, facts: Facts, criteria: SimpleNamespace
+) -> float:
+    """Return the lag [s] that the thrust has with a lead, 0 without one: that with which rotors
+    limit z no more than the estimator does, but no more lead than `criteria.lead`."""
+    own = float(described.rotor.lag)
+    seen = criteria.estimate * estimator(described, criteria)["position_bandwidth"]
+    wanted = max(criteria.vertical / seen - facts.seen, own / criteria.lead)
+    return rounded(wanted) if wanted < own else 0.0
+
+
 def _position(
-    described: VehicleDescription, found: Bandwidths, criteria: SimpleNamespace, fixed: dict
+    described: VehicleDescription,
+    facts: Facts,
+    found: Bandwidths,
+    criteria: SimpleNamespace,
+    fixed: dict,
 ) -> dict[str, Any]:
     thrust = criteria.authority.thrust * described.full_thrust
     weight = described.mass * described.gravity
@@ -89,6 +104,8 @@ def _position(
         "thrust_max": rounded(thrust),
         "tilt_max": rounded(tilt),
         "attitude_cutoff": rounded(corner / (2.0 * math.pi)),
+        "rotor_lag": described.rotor.lag,
+        "thrust_response": thrust_response(described, facts, criteria),
     }
 
 
@@ -141,8 +158,11 @@ def _mission(described: VehicleDescription, found: Bandwidths, tilt: float) -> d
 
 
 def _bridge(
-    described: VehicleDescription, facts: Facts, criteria: SimpleNamespace
+    described: VehicleDescription, facts: Facts, found: Bandwidths, criteria: SimpleNamespace
 ) -> dict[str, Any]:
+    """A factor of the thrust that changes is a load that changes: z errs by its rate / gain on the
+    integral of e."""
+    integral = criteria.feedback.integral * float(found.position[Z]) ** 3
     torque = np.array(criteria.authority.torque) * facts.torque
     reached = criteria.authority.spin_up * torque / facts.inertia
     most = 0.5 * (criteria.authority.thrust + 1.0) * described.full_thrust
@@ -150,6 +170,8 @@ def _bridge(
         "thrust_min": rounded(LEAST_THRUST * described.mass * described.gravity),
         "thrust_max": rounded(most),
         "rate_limit": listed(np.minimum(RateLimits().rate_limit, reached)),
+        "identification_lag": rounded(described.rotor.lag + criteria.identification.filter),
+        "factor_slew": rounded(criteria.identification.error * integral / described.gravity),
     }
 
 

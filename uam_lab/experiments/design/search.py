@@ -28,6 +28,7 @@ from uam_lab.experiments.design.gains import (
     autopilot_gains,
     estimator,
     sections,
+    thrust_response,
 )
 from uam_lab.experiments.design.rate_loop import rate_loop
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, analyse, fastest_mode
@@ -109,6 +110,7 @@ class Search:
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
+        self._points = self._operating_points()
 
     def bandwidths(self) -> Bandwidths:
         """Return the bandwidths: what the formulas allow, times the share of each loop."""
@@ -127,9 +129,10 @@ class Search:
         names = described.coordinates
         seen = c.estimate * estimator(described, c)["position_bandwidth"]
         across = c.horizontal * float(attitude[: YAW - ROLL].min())
+        lag = thrust_response(described, facts, c) or facts.lag[0]
         room = c.authority.thrust * described.full_thrust / described.mass - described.gravity
         vertical = {
-            "rotor lag": c.vertical / (facts.lag[0] + facts.seen),
+            "rotor lag": c.vertical / (lag + facts.seen),
             "estimator": seen,
             "thrust": math.sqrt(max(room, 0.1) / (c.saturation.height * c.feedback.stiffness)),
         }
@@ -159,16 +162,23 @@ class Search:
         described = replace(self._described, autopilot_gains=gains)
         own = sections(described, self.facts, bandwidths, self._criteria)
         profile = profile_of(own, Path(f"{described.name}_profile.yaml"), described)
-        cases, faults = [], {}
-        for label, arm, mass in self._points():
+        cases = []
+        for point in list(self._points):
+            label, arm, mass = point
             stack = stack_model(profile, Vehicle.of(described), mass, arm)
             analysis = analyse(stack)
-            cases.append(Case(label, stack, analysis, {}, fastest_mode(stack)))
-            for loop, fault in self._failing(stack, analysis).items():
-                faults.setdefault(loop, fault._replace(why=f"{fault.why}, {label}"))
-        return Found(described, profile, tuple(cases), faults)
+            cases.append(Case(label, stack, analysis, {}, analysis.mode))
+            if faults := self._failing(stack, analysis):
+                # the hardest point first: others are looked at once it has its margins
+                self._points.remove(point)
+                self._points.insert(0, point)
+                named = {
+                    loop: one._replace(why=f"{one.why}, {label}") for loop, one in faults.items()
+                }
+                return Found(described, profile, tuple(cases), named)
+        return Found(described, profile, tuple(cases), {})
 
-    def _points(self) -> list[tuple[str, tuple[float, ...], float]]:
+    def _operating_points(self) -> list[tuple[str, tuple[float, ...], float]]:
         """Return label, joint angles and payload [kg] of each operating point."""
         poses, mass = self.facts.poses, payload(self._described, self._criteria)
         loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
