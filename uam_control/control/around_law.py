@@ -21,10 +21,10 @@ from uam_control.control.output_limits import (
     take_known_load,
     turn_level,
 )
+from uam_control.control.rotor_lead import RotorLead, lead_force
 from uam_control.control.sample_hold import is_new
-from uam_control.control.slow_rotors import SlowRotors, lead_force, lift_off
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW, Z
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays, LawInputs
 from uam_control.maths.compiled import borrowing, inlined
@@ -49,13 +49,13 @@ class ControllerArrays(NamedTuple):
 
 class PositionArrays(NamedTuple):
     """Of the `PositionController`. carried [m/s^2]: bias (3,) of the law, integral (3,) of
-    integral_gain e; rotors: what is done about them; turning: whether the bias turns with the
-    heading; filter, lead, attitude: see `attitude_reference_step`."""
+    integral_gain e; rotors: lead for their lag; turning: whether the bias turns with the heading;
+    filter, lead, attitude: see `attitude_reference_step`."""
 
     all: ControllerArrays
     completion: ForceCompletion
     carried: tuple[np.ndarray, np.ndarray]
-    rotors: SlowRotors
+    rotors: RotorLead
     turning: bool
     cutoff: float
     filter: np.ndarray
@@ -164,7 +164,7 @@ def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
 def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     """Complete the law's force and limit it; then write the desired attitude.
 
-    See `complete_and_limit`, `slow_rotors` and `attitude_reference_step`. The bias of the next tick turns with the
+    See `complete_and_limit`, `lead_force` and `attitude_reference_step`. The bias of the next tick turns with the
     reference's heading: about the vertical body rates and rates of the heading differ by the tilt.
     """
     m, tau = a.all.numbers[0], a.all.tau
@@ -173,8 +173,6 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     cut = complete_and_limit(reference, e, limits, saturated, dt, a.carried, found, tau)
     led = lead_force(a.rotors, limits.thrust_min, limits.thrust_max, dt, tau)
     m.saturated = cut or led
-    climb = a.all.own[E_DOT][Z] + reference[CHI_DOT, Z]
-    lift_off(a.rotors, climb, dt, a.carried[0])
     attitude_reference_step(tau, reference, a.cutoff, dt, a.filter, a.lead, a.attitude)
     if a.turning and m.frozen == 0:
         turn_level(reference[CHI_DOT, YAW] * dt, a.carried[0])

@@ -36,8 +36,8 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
 )
+from uam_control.control.rotor_lead import RotorLead
 from uam_control.control.sample_hold import SampleHold
-from uam_control.control.slow_rotors import MEMORY, SlowRotors
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
@@ -159,7 +159,7 @@ class PositionController(Controller):
     def __init__(self, parameters: PositionLimits) -> None:
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
         self._integral = np.zeros(3)
-        self._thrust, self._lift = np.full(1, math.nan), record(*MEMORY)
+        self._made = np.full(1, math.nan)  # thrust of the rotors, see `RotorLead`
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> PositionArrays:
@@ -179,10 +179,7 @@ class PositionController(Controller):
         )
         filtered = float(cutoff), desired.filter, desired.lead, desired.value
         carried = self.law.bias, self._integral
-        rotors = SlowRotors(
-            *(float(p.rotor_lag), float(p.thrust_response), float(p.lift_rate)),
-            *(float(p.lift_most), self._thrust, self._lift),
-        )
+        rotors = RotorLead(float(p.rotor_lag), float(p.thrust_response), self._made)
         turning = p.bias_frame == HEADING
         arrays = PositionArrays(of_all, completion, carried, rotors, turning, *filtered)
         rows = self._errors
@@ -199,15 +196,6 @@ class PositionController(Controller):
         super()._forget()
         self._integral[:] = 0.0
 
-    def _handed_back(self, reference: np.ndarray) -> bool:
-        begins = not self.flying
-        in_flight = super()._handed_back(reference)
-        if begins:
-            self._thrust[:] = math.nan
-            grounded = not in_flight and self._parameters.lift_rate > 0.0
-            self._lift[0] = grounded, 0.0, 0.0
-        return in_flight
-
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
     ) -> np.ndarray:
@@ -218,6 +206,7 @@ class PositionController(Controller):
         """
         if not flying:
             self._attitude.reset(state[CHI, YAW])
+            self._made[:] = math.nan
             return self._idle()
         if self.enter(state, reference):
             self._attitude.begin(state, reference)

@@ -80,13 +80,6 @@ class PositionLimits(ParameterSet):
     thrust_response: float = number(
         0.0, "lag that the thrust has with a lead for that of the rotors, 0 = no lead", "s", 0.0, 1.0
     )
-    lift_rate: float = number(
-        0.0, "growth of theta_hat on the ground until the vehicle lifts off, 0 = none", "m/s^3",
-        0.0, 20.0,
-    )  # fmt: skip
-    lift_most: float = number(
-        2.5, "largest acceleration that theta_hat adds so", "m/s^2", 0.0, 10.0
-    )
 
     def check_together(self) -> None:
         """See `ParameterSet.check_together`."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.control.output_limits import RateLimits
-from uam_control.coordinates import ROLL, YAW, Z
+from uam_control.coordinates import ROLL, YAW
 from uam_control.laws import lyapunov
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
@@ -69,7 +69,7 @@ def sections(
         "arm_controller": _arm(facts, found, criteria, fixed["arm_controller"]),
         "state_estimator": estimator(described, criteria),
         "mission": _mission(described, found, position["tilt_max"]),
-        "mavlink_bridge": _bridge(described, facts, found, criteria),
+        "mavlink_bridge": _bridge(described, facts, criteria),
     }
     return {node: fixed.get(node, {}) | values for node, values in own.items()}
 
@@ -158,11 +158,8 @@ def _mission(described: VehicleDescription, found: Bandwidths, tilt: float) -> d
 
 
 def _bridge(
-    described: VehicleDescription, facts: Facts, found: Bandwidths, criteria: SimpleNamespace
+    described: VehicleDescription, facts: Facts, criteria: SimpleNamespace
 ) -> dict[str, Any]:
-    """A factor of the thrust that changes is a load that changes: z errs by its rate / gain on the
-    integral of e."""
-    integral = criteria.feedback.integral * float(found.position[Z]) ** 3
     torque = np.array(criteria.authority.torque) * facts.torque
     reached = criteria.authority.spin_up * torque / facts.inertia
     most = 0.5 * (criteria.authority.thrust + 1.0) * described.full_thrust
@@ -170,8 +167,6 @@ def _bridge(
         "thrust_min": rounded(LEAST_THRUST * described.mass * described.gravity),
         "thrust_max": rounded(most),
         "rate_limit": listed(np.minimum(RateLimits().rate_limit, reached)),
-        "identification_lag": rounded(described.rotor.lag + criteria.identification.filter),
-        "factor_slew": rounded(criteria.identification.error * integral / described.gravity),
     }
 
 

@@ -67,8 +67,6 @@ def stack_model(
     """
     # adaptation is slow, and its gains are given
     sets = profile.sets | {node: profile.sets[node].linear() for node in CONTROLLERS}
-    position = next(iter(CONTROLLERS))
-    sets[position] = replace(sets[position], lift_rate=0.0)  # it has lifted off
     described, numbers = vehicle.description, vehicle.numbers
     scenario = load_scenario("hover", described)
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)
