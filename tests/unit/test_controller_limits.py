@@ -19,6 +19,7 @@ from uam_control.control.output_limits import (
     take_known_load,
     wash_out,
 )
+from uam_control.control.rotor_lead import RotorLead, lead_force
 from uam_control.settings.parameter_set import ParameterError
 
 A = math.atan2(0.6, 0.8)  # tan A = .75
@@ -43,6 +44,30 @@ def test_force_by_hand(tau, thrust_max, tilt_max, expected, cut):
     limited = np.full(3, 77.0)
     assert limit_force(np.array(tau), 5.0, 2.0, thrust_max, tilt_max, limited) == cut
     np.testing.assert_allclose(limited, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("largest", "expected", "made", "cut"), [
+    (50.0, (0.0, 22.5, 30.0), 20.0, False),  # 10 + 0.1/0.05 (20 - 10), half a lag later: 20
+    (30.0, (0.0, 18.0, 24.0), 17.0, True),  # 30 of the 37.5 N wanted; 10 + (24 - 10)/2
+])  # fmt: skip
+def test_lead_of_rotors_by_hand(largest, expected, made, cut):
+    tau, lead = np.array([0.0, 15.0, 20.0]), RotorLead(0.1, 0.05, np.array([10.0]))
+    assert lead_force(lead, 2.0, largest, 0.1 * math.log(2.0), tau) == cut
+    np.testing.assert_allclose(tau, expected)
+    np.testing.assert_allclose(lead.made, made)
+
+
+def test_lead_of_rotors_towards_less_keeps_the_least_thrust():
+    tau, lead = np.array([0.0, 0.0, 5.0]), RotorLead(0.1, 0.05, np.array([10.0]))
+    assert lead_force(lead, 2.0, 50.0, 0.004, tau)  # 10 - 2*5 = 0 is wanted
+    np.testing.assert_allclose(tau, [0.0, 0.0, 2.0])
+
+
+def test_without_a_lead_and_at_first_the_force_stays():
+    for response, made in (0.0, 10.0), (0.05, math.nan):
+        tau = np.array([0.0, 15.0, 20.0])
+        assert not lead_force(RotorLead(0.1, response, np.array([made])), 2.0, 50.0, 0.004, tau)
+        np.testing.assert_array_equal(tau, [0.0, 15.0, 20.0])
 
 
 @pytest.mark.parametrize(("tau", "expected", "cut"), [

@@ -17,6 +17,7 @@ from uam_lab.cli.main import main
 from uam_lab.experiments.design import search
 from uam_lab.experiments.design.criteria import DesignError, load_criteria
 from uam_lab.experiments.design.facts import Facts, inertias, largest_torque, noise_gains
+from uam_lab.experiments.design.gains import thrust_response
 from uam_lab.experiments.design.rate_loop import rate_loop
 from uam_lab.experiments.margins.kept import missed
 from uam_lab.experiments.margins.margins import Margins
@@ -50,10 +51,10 @@ def test_rate_loop_that_only_its_dead_time_limits():
 
 
 def test_rate_loop_that_torque_limits():
-    """0.45 x 1 N m = stiffness 0.4 lambda_2 0.21 rad; without D: lambda_2^2 = 0.45 / (J 0.084)."""
+    """0.45 x 1 N m = stiffness 0.5 lambda_2 0.15 rad; without D: lambda_2^2 = 0.45 / (J 0.075)."""
     found = rate_loop(facts(inertia=1.0, torque=1.0), 0, load_criteria(), 1.0)
     assert found.d == 0.0
-    assert found.bandwidth == pytest.approx(math.sqrt(0.45 / 0.084), rel=1e-6)
+    assert found.bandwidth == pytest.approx(math.sqrt(0.45 / 0.075), rel=1e-6)
     assert "torque" in found.limit
 
 
@@ -65,7 +66,7 @@ def test_a_rate_loop_keeps_its_damping_and_its_torque(inertia, lag, torque):
     # J T s^2 + J (1 + d) s + S P: damping (1 + d) / (2 sqrt(T S P / J))
     damping = (1.0 + d) / (2.0 * math.sqrt((lag + 0.01) * found.stiffness / inertia))
     assert damping >= 0.9 * (1.0 - 1e-9)
-    assert found.stiffness * 0.4 * found.bandwidth * 0.21 <= 0.45 * torque * (1.0 + 1e-9)
+    assert found.stiffness * 0.5 * found.bandwidth * 0.15 <= 0.45 * torque * (1.0 + 1e-9)
 
 
 def test_noise_limits_the_gains():
@@ -98,6 +99,33 @@ def test_inertia_of_a_vehicle_over_the_poses():
     assert poses["most inertia"] == (0.0, 0.0)  # straight down is farthest from the body
     assert np.all(middle > [0.0165, 0.0186, 0.0250])  # of the bare body
     assert np.all(joints > 0.010)  # the servo's own
+
+
+@pytest.mark.parametrize(("lag", "expected"), [
+    (0.03, 0.0),  # faster than needed
+    (0.1, 0.5 / (0.7 * 12.0) - 0.01),  # 0.5 rad at 0.7 of the estimator's 12 rad/s, seen 10 ms late
+    (0.3, 0.1),  # a third
+])  # fmt: skip
+def test_lead_that_slow_rotors_get(lag, expected):
+    own = load_description()
+    described = replace(own, rotor=replace(own.rotor, lag_up=lag, lag_down=lag))
+    assert thrust_response(described, facts(), load_criteria()) == pytest.approx(expected, rel=1e-3)
+
+
+def test_effects_grow_with_the_vehicle():
+    """Twice the radius: a rotor of 8 times the mass at half the speed, balanced to the same grade;
+    twice the mass: twice the force, half the resistance."""
+    effects = {
+        "propeller_vibration": {"imbalance": 1e-6},
+        "standing_load": {"force": [0.5, 0.0, -1.0], "torque": [0.0, 0.0, 0.1], "turning": 1.0},
+        "battery_sag": {"capacity": 5.0, "resistance": 0.005, "electronics": 20.0},
+    }
+    made = vehicles.grown(vehicles.Made("large", 4.4, 4, 0.484, 0.02, 2), effects)
+    assert made["propeller_vibration"]["imbalance"] == pytest.approx(16e-6)
+    assert made["standing_load"]["force"] == pytest.approx([1.0, 0.0, -2.0])
+    assert made["standing_load"]["torque"] == pytest.approx([0.0, 0.0, 0.4])
+    assert made["standing_load"]["turning"] == 1.0
+    assert made["battery_sag"]["resistance"] == pytest.approx(0.0025)
 
 
 def test_criteria_of_a_file_replace_single_entries(tmp_path):

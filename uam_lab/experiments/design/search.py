@@ -195,11 +195,12 @@ class Search:
             base = [name for name in analysis.loops if name in stack.coordinates[: YAW + 1]]
             worst = min(base, key=lambda name: analysis.loops[name][1].delay)
             found.setdefault(worst, Fault(f"delay margin {1e3 * analysis.setpoint_delay:.0f} ms"))
+        # what is wrong with the rate loop shows in all loops around it: it is mended first
         factor = 10.0 ** (wanted.gain / 20.0)
-        if not found and analysis.stable:
+        if analysis.stable and (not found or {*stack.coordinates[ROLL:YAW]} & {*found}):
             for name, one in (("up", factor), ("down", 1.0 / factor)):
                 if fastest_mode(scaled_motors(stack, one)).growth >= GROWTH:
-                    found[RATES] = Fault(f"gain margin of all motors {name}")
+                    return {RATES: Fault(f"gain margin of all motors {name}")}
         if not analysis.stable and not found:
             found = dict.fromkeys(self._shares, Fault("unstable"))
         return found
