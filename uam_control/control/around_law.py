@@ -164,8 +164,9 @@ def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
 def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     """Complete the law's force and limit it; then write the desired attitude.
 
-    See `complete_and_limit`, `lead_force` and `attitude_reference_step`. The bias of the next tick turns with the
-    reference's heading: about the vertical body rates and rates of the heading differ by the tilt.
+    See `complete_and_limit`, `lead_force` and `attitude_reference_step`. The bias of the next tick
+    turns with the reference's heading: about the vertical body rates and rates of the heading
+    differ by the tilt.
     """
     m, tau = a.all.numbers[0], a.all.tau
     saturated, e, found = m.saturated != 0, a.all.own[E], a.all.law.tau

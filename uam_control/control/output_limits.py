@@ -78,7 +78,7 @@ class PositionLimits(ParameterSet):
     )
     rotor_lag: float = number(0.05, "lag of the rotors' thrust", "s", 1e-3, 1.0)
     thrust_response: float = number(
-        0.0, "lag that the thrust has with a lead for that of the rotors, 0 = no lead", "s", 0.0, 1.0
+        0.0, "lag of the thrust with a lead for that of the rotors, 0 = no lead", "s", 0.0, 1.0
     )
 
     def check_together(self) -> None:
