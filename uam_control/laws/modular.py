@@ -196,7 +196,7 @@ def adapt_bias(
     theta_hat_j' = Gamma_j r_j - leakage theta_hat_j, exact for r_j constant over the tick. On the
     ball ||theta_hat_j|| = bias_limit the part of Gamma_j r_j that points outwards is taken away,
     along Gamma_j theta_hat_j: with V's term 1/2 theta~' Gamma^-1 theta~ this adds nothing to dV/dt
-    for a theta_j within the ball (docs/stability.md). While the actuator saturates, no entry grows.
+    for a theta_j within the ball (docs/law.md). While the actuator saturates, no entry grows.
     """
     squared = outward = weight = 0.0
     for i in range(len(bias)):
