@@ -11,8 +11,8 @@ import numpy as np
 from fuzzing.messages import number
 from uam_control.frames import swap_body
 from uam_control.offboard.sequence import OffboardSequence, Phase
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, SetpointRefused
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.thrust_identification import ThrustIdentification
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort

@@ -16,8 +16,8 @@ from uam_control.frames import swap_body
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence, Phase
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot import server

@@ -10,9 +10,8 @@ from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_multiply
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import FORCE, MavCmd, MavResult, Mode
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
-from uam_control.setpoints.wrench_target import WrenchTarget
+from uam_control.setpoints.targets import AttitudeTarget, WrenchTarget
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot

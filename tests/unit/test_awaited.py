@@ -4,8 +4,8 @@ from collections import Counter
 
 import pytest
 
-from uam_sim_bridge.nodes import awaited
-from uam_sim_bridge.nodes.awaited import REPORTS, SAY_AFTER, Awaited
+from uam_sim_bridge.nodes import lockstep
+from uam_sim_bridge.nodes.lockstep import REPORTS, SAY_AFTER, Awaited
 
 NODES = ("mission", "arm_controller")
 
@@ -23,7 +23,7 @@ class Reported:
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(awaited.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(lockstep.time, "monotonic", lambda: now[0])
     return now
 
 

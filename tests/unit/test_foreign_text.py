@@ -8,7 +8,7 @@ import pytest
 from rich.table import Table
 
 import uam_lab
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_lab.records.results.templates import markdown_table
 from uam_lab.records.results.terminal import Terminal, say
 from uam_lab.report.figures import style

@@ -10,8 +10,8 @@ import pytest
 from uam_control.offboard.exchange import Request
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.signing import Signing

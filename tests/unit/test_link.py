@@ -10,8 +10,8 @@ from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import MavCmd, MavResult, Mode
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence, Phase
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot

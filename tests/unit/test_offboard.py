@@ -6,7 +6,7 @@ from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence, Phase
-from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_sim_bridge.autopilot.core import Autopilot
 
 DOWN = np.array([0.0, 0.0, -9.81])

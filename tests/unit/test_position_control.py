@@ -7,8 +7,8 @@ import pytest
 
 from uam_control.ages import age_by
 from uam_control.setpoints.desired import Desired, level
-from uam_control.setpoints.position_target import FLOWN_MASKS, PositionTarget
 from uam_control.setpoints.setpoint_types import position_setpoint
+from uam_control.setpoints.targets import FLOWN_MASKS, PositionTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion

@@ -15,11 +15,11 @@ from uam_control.maths.rotations import (
     matrix_from_euler,
     quaternion_from_euler,
 )
-from uam_control.setpoints.attitude_target import ATTITUDE as ATTITUDE_TARGET
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import SetpointSource, Situation
 from uam_control.setpoints.setpoint_types import SETPOINTS
+from uam_control.setpoints.targets import ATTITUDE as ATTITUDE_TARGET
 from uam_control.vehicle import GRAVITY
 
 TICK = 0.004

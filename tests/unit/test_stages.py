@@ -12,7 +12,7 @@ from uam_control.mission import Mission, load_scenario
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
-from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import development as mavlink2
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_sim_bridge.mavlink.protocol.wire import (
     UNREAD,
     Codec,

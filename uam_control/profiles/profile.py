@@ -33,10 +33,10 @@ from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
 from uam_control.settings import configuration
-from uam_control.settings.names import unknown
 from uam_control.settings.parameter_file import EVERY_NODE, ProfileError, read_sections
 from uam_control.settings.parameter_set import MissingParameter, ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
+from uam_control.settings.texts import unknown
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
 # controller → (parameters of its limits, its part of chi)

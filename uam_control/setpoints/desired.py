@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import CHI, Z
-from uam_control.setpoints.attitude_target import AttitudeTarget
-from uam_control.setpoints.position_target import PositionTarget
-from uam_control.setpoints.wrench_target import WrenchTarget
+from uam_control.setpoints.targets import AttitudeTarget, PositionTarget, WrenchTarget
 
 
 @dataclass(slots=True)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from uam_control.settings.text_file import text_of
+from uam_control.settings.texts import text_of
 
 OTHER_SEPARATORS = {";": "';'", "\t": "a tab", "|": "'|'"}
 

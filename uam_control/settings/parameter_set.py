@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from uam_control.settings.names import unknown
+from uam_control.settings.texts import unknown
 
 TINY = 1e-9
 HUGE = 1e6

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings import yaml_file
-from uam_control.settings.names import unknown
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import unknown, visible
 
 
 def read_section(file: Path, error: type[ValueError]) -> Section:

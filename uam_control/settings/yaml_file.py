@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from uam_control.settings.text_file import text_of
+from uam_control.settings.texts import text_of
 
 _SafeLoader: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml, if PyYAML has it
 T = TypeVar("T")

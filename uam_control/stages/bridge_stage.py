@@ -22,7 +22,6 @@ from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.level_hold import HoldParameters, follow_thrust
 from uam_control.setpoints.loop_delay import DelayNumbers
 from uam_control.setpoints.rate_thrust_map import (
@@ -39,6 +38,7 @@ from uam_control.setpoints.setpoint_source import (
     silent,
 )
 from uam_control.setpoints.setpoint_types import SetpointParameters, rates_setpoint
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.stages.autopilot_port import AutopilotPort, PortSteps
 from uam_control.stages.autopilot_report import AutopilotReport, AutopilotReports

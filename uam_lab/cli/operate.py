@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_lab.cli.command import Command, Subcommands, chosen_flight, number
 from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.records.results.terminal import say

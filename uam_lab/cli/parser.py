@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_lab.cli import output
 from uam_lab.cli.command import USER_ERRORS, WRONG_USE
 from uam_lab.flights.processes.interrupts import INTERRUPTED

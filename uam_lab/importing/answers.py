@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings import configuration
-from uam_control.settings.names import unknown
 from uam_control.settings.section import Section, read_section
+from uam_control.settings.texts import unknown
 from uam_lab.importing.source import ImportRefused
 
 FILE, DERIVED, ASKED, ASSUMED = "from the file", "derived", "asked", "assumed"

@@ -48,8 +48,8 @@ def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     moment = answers.assumed.number("moment_per_radius") * radius.value
     curve = answers.assumed.number("curve_factor")
 
-    def told(name: str, usual: float, why: str, most: float = math.inf) -> Told:
-        return _known(parts, name) or answers.number(f"rotors.{name}", usual, why, most)
+    def told(name: str, usual: float, why: str) -> Told:
+        return _known(parts, name) or answers.number(f"rotors.{name}", usual, why)
 
     return {
         "layout": layout,

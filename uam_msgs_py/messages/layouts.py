@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_control.stamps import SECOND
 
 ENCAPSULATION = 4

@@ -18,7 +18,7 @@ from rclpy.subscription import Subscription
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped

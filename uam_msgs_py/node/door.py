@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes

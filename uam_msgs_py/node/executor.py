@@ -16,9 +16,8 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.node.door import Door
-from uam_msgs_py.node.other_entities import OtherEntities
+from uam_msgs_py.node.other_entities import OtherEntities, WaitSet, wait_for
 from uam_msgs_py.node.tick_times import DECODE, TAKE, NoTickTimes
-from uam_msgs_py.node.waiting import WaitSet, wait_for
 
 
 class LeanExecutor:

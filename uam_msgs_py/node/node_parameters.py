@@ -17,7 +17,6 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 
-from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import (
     Choice,
     ParameterError,
@@ -26,7 +25,7 @@ from uam_control.settings.parameter_set import (
     Switch,
     Text,
 )
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import unknown, visible
 from uam_msgs_py.node.namespace import shared_section
 
 S = TypeVar("S", bound=ParameterSet)

@@ -12,20 +12,46 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.timer import Timer
 
 from uam_msgs_py.node.answering import answered
-from uam_msgs_py.node.waiting import WaitSet
 
+WaitSet = rclpy_implementation.WaitSet  # not part of rclpy's public API
 REST_PERIOD = 0.02  # s between two checks
 REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 REPORT_PERIOD = 500_000_000  # ns, from which a timer's period is that of a report
 EVENT_PERIOD = 1.0  # s between two checks of events, which only report
 OF_EVERY_NODE = "rcl_interfaces", "type_description_interfaces"  # modules of their services
 TURNS = 10  # checks in which each of these is asked once
+
+
+def wait_for(
+    messages: WaitSet, inputs: Sequence[Any], timeout: float, busy_poll: float = 0.0
+) -> None:
+    """Wait until one of `inputs` has a message, at most `timeout` [s].
+
+    messages: a wait set for them; inputs: handles of subscriptions; without any it sleeps.
+    busy_poll: time [s] in which it looks again and again before it sleeps; the message then needs
+    no wake-up of this thread by the system.
+    """
+    if not inputs:
+        time.sleep(timeout)
+        return
+    end = time.monotonic() + min(busy_poll, timeout) if busy_poll else 0.0
+    asleep = not end
+    while True:
+        messages.clear_entities()
+        for handle in inputs:
+            messages.add_subscription(handle)
+        messages.wait(int(timeout * 1e9) if asleep else 0)
+        if asleep or messages.get_ready_entities("subscription"):
+            return
+        asleep = time.monotonic() >= end
 
 
 class OtherEntities:

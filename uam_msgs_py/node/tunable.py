@@ -15,7 +15,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.node.door import Door

@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.ages import age_by
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
 from uam_control.offboard.modes import MavCmd, MavResult, Severity
-from uam_control.setpoints.attitude_target import AttitudeTarget
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot

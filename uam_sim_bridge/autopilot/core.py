@@ -22,13 +22,13 @@ from uam_control.offboard.modes import (
     MavResult,
     Mode,
 )
-from uam_control.setpoints.attitude_target import (
+from uam_control.setpoints.desired import Target
+from uam_control.setpoints.targets import (
     ATTITUDE_AND_YAW_RATE,
     RATES,
+    PositionTarget,
+    WrenchTarget,
 )
-from uam_control.setpoints.desired import Target
-from uam_control.setpoints.position_target import PositionTarget
-from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_control.vehicle import load_description
 from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE

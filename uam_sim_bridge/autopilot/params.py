@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.settings import configuration, yaml_file
-from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.texts import unknown
 from uam_control.vehicle import VehicleDescription
 
 

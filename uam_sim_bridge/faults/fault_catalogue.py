@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from uam_control.settings.names import unknown
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError
+from uam_control.settings.texts import unknown
 from uam_sim_bridge.faults import (
     actuator_faults,
     cable_faults,

@@ -13,7 +13,6 @@ from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.setpoint_types import SetpointParameters
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
-from uam_control.settings.names import unknown
 from uam_control.settings.parameter_file import ProfileError
 from uam_control.settings.parameter_set import (
     ParameterSet,
@@ -28,6 +27,7 @@ from uam_control.settings.process_parameters import (
     ProcessParameters,
     TickTimesParameters,
 )
+from uam_control.settings.texts import unknown
 from uam_control.stages.vision_pacing import VisionParameters
 from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE

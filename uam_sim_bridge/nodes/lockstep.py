@@ -1,25 +1,68 @@
-"""The waits of a lockstep flight: for the answers of a tick, and for the recorder."""
+"""The waits of a lockstep flight: for the answers of a tick, and for the recorder.
+
+How long a node takes depends on the machine, so no wall time ends a wait. Every node takes its
+messages and reports in /diagnostics once a second. If all have done so REPORTS times since the wait
+began and an answer is still missing, a message was lost, or a node answers nothing. A process that
+has ended or is stopped reports nothing; `uam fly` finds it by its state.
+"""
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Collection
 
 from uam_control.stamps import SECOND
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import StopSignal
+from uam_msgs_py.node.connections import Connections
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.tunable import TunableNode
-from uam_sim_bridge.nodes.awaited import REPORTS, Awaited
 from uam_sim_bridge.nodes.plant_options import PlantParameters
 from uam_sim_bridge.nodes.plant_topics import SETPOINT, Answers, RecorderProgress, suspected
 from uam_sim_bridge.patience import Patience
 
+REPORTS = 10  # of each node; a tick needs one round of each of six nodes
+SAY_AFTER = 3.0  # [s] of wall time until a wait is told
 IN_TIME = 25  # complete ticks in a row after which the restart is finished
 RECORDER_LAG = SECOND  # [ns] receive buffers have room for more, see config/dds/fastdds.xml
 # [s], [ticks]: single samples of the autopilot's IMU may be lost. After these ticks time goes on at
 # the pace of the wall clock: without it the bridge could not relate the clocks again.
 IMU_WAIT, IMU_MISSING = 2.0, 3
+
+
+class Awaited:
+    """One wait at a time: `begin`, then `told` and `lost` while it lasts."""
+
+    def __init__(
+        self, reported: Connections, nodes: Collection[str], tell: Callable[[str], None]
+    ) -> None:
+        """reported: of the nodes; nodes: those that a tick needs; tell: called with whom the plant
+        waits for, at most once a second."""
+        self._reported, self._nodes, self._tell = reported, nodes, tell
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin a wait."""
+        self._begun = time.monotonic()
+        self._before: list[int] = []  # reports when it was told
+
+    def told(self, whom: Callable[[], str]) -> None:
+        """Tell whom the plant waits for, if it has waited for SAY_AFTER."""
+        if time.monotonic() - self._begun > SAY_AFTER:
+            self._before = self._before or self._counts()
+            self._tell(whom())
+
+    @property
+    def lost(self) -> bool:
+        """Whether every node has reported often enough since the wait was told."""
+        before = self._before
+        return bool(before) and all(
+            now - then >= REPORTS for now, then in zip(self._counts(), before, strict=True)
+        )
+
+    def _counts(self) -> list[int]:
+        return [self._reported.reports(node) for node in self._nodes]
 
 
 class Restart:

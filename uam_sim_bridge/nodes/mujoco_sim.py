@@ -50,10 +50,9 @@ from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
-from uam_sim_bridge.nodes.awaited import Awaited
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
-from uam_sim_bridge.nodes.lockstep import Lockstep, PlantStopped
+from uam_sim_bridge.nodes.lockstep import Awaited, Lockstep, PlantStopped
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import (

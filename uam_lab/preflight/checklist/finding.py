@@ -30,17 +30,15 @@ def at_most(
     name: str, value: float | None, limit: float, unit: str, standing: bool = False
 ) -> Finding:
     """Return the finding of a value with an upper limit; None: it is not known, not passed."""
-    known = value is not None
-    shown = f"{value:.3g} {unit}".strip() if known else UNKNOWN
-    return Finding(name, shown, f"at most {limit:.3g} {unit}".strip(), known and value <= limit,
-                   standing)  # fmt: skip
+    passed = value is not None and value <= limit
+    return Finding(name, _shown(value, unit), f"at most {_shown(limit, unit)}", passed, standing)
 
 
-def at_least(
-    name: str, value: float | None, limit: float, unit: str, standing: bool = False
-) -> Finding:
+def at_least(name: str, value: float | None, limit: float, unit: str) -> Finding:
     """Return the finding of a value with a lower limit; None: it is not known, not passed."""
-    known = value is not None
-    shown = f"{value:.3g} {unit}".strip() if known else UNKNOWN
-    return Finding(name, shown, f"at least {limit:.3g} {unit}".strip(), known and value >= limit,
-                   standing)  # fmt: skip
+    passed = value is not None and value >= limit
+    return Finding(name, _shown(value, unit), f"at least {_shown(limit, unit)}", passed)
+
+
+def _shown(value: float | None, unit: str) -> str:
+    return UNKNOWN if value is None else f"{value:.3g} {unit}".strip()

@@ -10,7 +10,7 @@ from typing import Any
 
 import jinja2
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 
 MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 
 
 class Terminal(Console):

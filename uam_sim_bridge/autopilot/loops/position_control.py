@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_control.setpoints.position_target import PositionTarget
+from uam_control.setpoints.targets import PositionTarget
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY, POSITION, VELOCITY
 from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.params import Parameters

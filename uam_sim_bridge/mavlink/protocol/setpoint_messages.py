@@ -6,16 +6,16 @@ import numpy as np
 
 from uam_control.frames import swap_euler, swap_world
 from uam_control.maths.rotations import euler_from_quaternion
-from uam_control.setpoints.attitude_target import AttitudeTarget
 from uam_control.setpoints.desired import Target
-from uam_control.setpoints.position_target import (
+from uam_control.setpoints.targets import (
     ACCELERATION_IGNORED,
     VELOCITY_IGNORED,
     YAW_RATE_IGNORED,
+    AttitudeTarget,
     PositionTarget,
+    WrenchTarget,
 )
 from uam_control.setpoints.vision_pose import VisionPose
-from uam_control.setpoints.wrench_target import WrenchTarget
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
 GROUP = 0  # of SET_ACTUATOR_CONTROL_TARGET: flight controls

@@ -12,7 +12,7 @@ import struct
 
 from pymavlink.dialects.v20 import development as mavlink2
 
-from uam_control.settings.visible_text import visible
+from uam_control.settings.texts import visible
 from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
 
 MARKER_1, MARKER_2 = 0xFE, 0xFD
@@ -22,7 +22,7 @@ _AUTOPILOT = 15  # index of HEARTBEAT.autopilot in a frame
 _MARKERS = re.compile(b"[\xfd\xfe]")
 
 # Messages that PX4 sends and pymavlink omits (work in progress in MAVLink): id → CRC_EXTRA. The
-# framer recognises these frames but does not decode them. (EVENT is decoded: event_messages.py.)
+# framer recognises these frames but does not decode them. (EVENT is decoded: events.py.)
 UNREAD = {8: 117, 290: 251, 291: 10, 361: 93, 371: 10, 380: 232, 411: 106, 413: 77}
 
 Message = mavlink2.MAVLink_message

@@ -1,0 +1,135 @@
+"""Setpoints as MAVLink has them: attitude or body rates, motion, torque; which of each are flown.
+
+SET_ATTITUDE_TARGET:
+
+| type_mask | ignored | flown |
+|---|---|---|
+| 128 | attitude | body rates and thrust |
+| 7 | body rates | attitude and thrust |
+| 3 | roll rate, pitch rate | attitude and thrust, with a yaw rate on top |
+
+SET_POSITION_TARGET_LOCAL_NED: position and yaw are required. Velocity, acceleration and yaw rate
+are feedforwards; a type mask may leave each of them out.
+
+SET_ACTUATOR_CONTROL_TARGET, group 0: the autopilot allocates torque and thrust to the motors; its
+attitude and rate loops do not act. PX4 v1.14 to v1.16: controls 0 to 2 are the torque setpoint, 3
+is the thrust setpoint. PX4 v1.17 has no handler for the message.
+
+Source: MAVLink common, ATTITUDE_TARGET_TYPEMASK, POSITION_TARGET_TYPEMASK, message 139; PX4 v1.16,
+MavlinkReceiver.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.frames import swap_body
+
+RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE = 128, 7, 3  # type masks
+FLOWN = "128 (body rates), 7 (attitude), 3 (attitude and yaw rate)"
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+STILL = np.zeros(3)
+NO_RATES = np.full(3, math.nan)
+VELOCITY_IGNORED, ACCELERATION_IGNORED, YAW_RATE_IGNORED = 0x038, 0x1C0, 0x800
+FLOWN_MASKS = tuple(
+    velocity | acceleration | rate
+    for velocity in (0, VELOCITY_IGNORED)
+    for acceleration in (0, ACCELERATION_IGNORED)
+    for rate in (0, YAW_RATE_IGNORED)
+)
+
+
+class AttitudeTarget(NamedTuple):
+    """One setpoint for the autopilot, in its frames.
+
+    quaternion (4,): desired attitude FRD → NED [w x y z]; rates (3,): body rates [rad/s, FRD], for
+    ATTITUDE_AND_YAW_RATE the last is the rate about the world's vertical axis, positive downwards;
+    thrust: 0..1.
+    """
+
+    type_mask: int
+    quaternion: np.ndarray
+    rates: np.ndarray
+    thrust: float
+
+    @classmethod
+    def of_rates(cls, rates: np.ndarray, thrust: float) -> AttitudeTarget:
+        """Return the setpoint of body rates (3,) [rad/s, FRD] and thrust 0..1."""
+        return cls(RATES, UPRIGHT, rates, thrust)
+
+    @classmethod
+    def of_attitude(cls, quaternion: np.ndarray, thrust: float) -> AttitudeTarget:
+        """Return the setpoint of an attitude (4,) FRD → NED [w x y z] and thrust 0..1."""
+        return cls(ATTITUDE, quaternion, STILL, thrust)
+
+    @property
+    def body_rates(self) -> np.ndarray:
+        """Body rates (3,) [rad/s, FLU]; NaN where it has none."""
+        return swap_body(self.rates) if self.type_mask == RATES else NO_RATES
+
+    def refused(self) -> str:
+        """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
+        total = self.thrust + sum(self.rates.tolist())
+        if self.type_mask != RATES:
+            if self.type_mask not in (ATTITUDE, ATTITUDE_AND_YAW_RATE):
+                return f"type_mask {self.type_mask}, allowed: {FLOWN}"
+            q = self.quaternion
+            squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+            if squared == 0.0:
+                return "the attitude is no quaternion"
+            total += squared
+        return "" if math.isfinite(total) else "not finite"
+
+
+class PositionTarget(NamedTuple):
+    """One setpoint of the motion for the autopilot's position control.
+
+    position (3,) [m], velocity (3,) [m/s], acceleration (3,) [m/s^2]: NED; yaw [rad], yaw_rate
+    [rad/s]: clockwise from north. Values that the type mask ignores are 0.
+    """
+
+    type_mask: int
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    yaw: float
+    yaw_rate: float
+
+    @property
+    def body_rates(self) -> np.ndarray:
+        """Body rates (3,) [rad/s, FLU]: NaN, it has none."""
+        return NO_RATES
+
+    @property
+    def thrust(self) -> float:
+        """NaN: the autopilot chooses the thrust."""
+        return math.nan
+
+    def refused(self) -> str:
+        """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
+        if self.type_mask not in FLOWN_MASKS:
+            return f"type_mask {self.type_mask}, allowed: position and yaw with or without the rest"
+        total = self.position.sum() + self.velocity.sum() + self.acceleration.sum()
+        return "" if math.isfinite(total + self.yaw + self.yaw_rate) else "not finite"
+
+
+class WrenchTarget(NamedTuple):
+    """One setpoint of the autopilot's allocation.
+
+    torque (3,): normalised, -1..1, FRD; thrust: normalised collective, 0..1.
+    """
+
+    torque: np.ndarray
+    thrust: float
+
+    @property
+    def body_rates(self) -> np.ndarray:
+        """Body rates (3,) [rad/s, FLU]: NaN, it has none."""
+        return NO_RATES
+
+    def refused(self) -> str:
+        """Return why no autopilot should fly it: what is not finite; "" if nothing."""
+        return "" if math.isfinite(self.torque.sum() + self.thrust) else "not finite"
