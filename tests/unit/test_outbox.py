@@ -4,8 +4,7 @@ import pytest
 
 from uam_sim_bridge.mavlink.hil.router import Thinner, sustainable_rate
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
-from uam_sim_bridge.mavlink.transport.outbox import Outbox
-from uam_sim_bridge.mavlink.transport.pacing import Meter, Pacer
+from uam_sim_bridge.mavlink.transport.pacing import Meter, Outbox, Pacer
 
 
 class Line:

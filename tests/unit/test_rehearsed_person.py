@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.vehicle import load_description
-from uam_sim_bridge.laboratory.hands import Grip, joint_torque, wrench
-from uam_sim_bridge.laboratory.person import MOTIONS, Person, eased
+from uam_sim_bridge.laboratory.person import MOTIONS, Grip, Person, eased, joint_torque, wrench
 
 VEHICLE = load_description()
 

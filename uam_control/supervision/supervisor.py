@@ -12,15 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import CHI, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
-from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.checks import (
     CONTRADICTION,
     DELAYS,
@@ -28,52 +25,15 @@ from uam_control.supervision.checks import (
     Checks,
     ExceededLimit,
 )
+from uam_control.supervision.decision import Decision, Guide, StateTransition
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
 from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
-
-@plain_members
-class Guide(Enum):
-    """Behaviour of the reference."""
-
-    NOTHING = "no reference for position and attitude"
-    SCENARIO = "follows the scenario"
-    STOP = "stops on the scenario's path and stays there"
-    DESCEND = "descends vertically"
-
-
-class Decision(NamedTuple):
-    """The supervisor's output.
-
-    cause: why the state was entered. arm: desired arming of the autopilot. keep_magnet: an
-    energised magnet stays energised; stow: the arm moves to its landing angles. Both apply only if
-    the guide is not SCENARIO. regains: number of commands so far to regain a released vehicle.
-    """
-
-    state: State
-    cause: str
-    guide: Guide
-    arm: bool
-    keep_magnet: bool
-    stow: bool
-    regains: int
-
-
 TOO_HEAVY = "no lift-off: too little thrust for the weight"
 NOT_FOLLOWED = "no lift-off: the autopilot is silent, or lands by itself"
-
-
-class StateTransition(NamedTuple):
-    """A transition at `stamp` [s]."""
-
-    stamp: float
-    source: State
-    target: State
-    event: Event
-    cause: str
 
 
 class Supervisor:

@@ -24,8 +24,7 @@ from uam_lab.cli.command import (
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import CLOCKS, ENGINES, check_clock
 from uam_lab.flights.flight_settings import require_ros
-from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
-from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab, settings_of
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.faults import fault_catalogue, feasibility

@@ -13,8 +13,7 @@ from uam_lab.flights.flight_settings import require_ros
 from uam_lab.flights.library.flight_result import FlightResult
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.progress import Progress
-from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab
-from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab, settings_of
 from uam_lab.records.results.terminal import Terminal
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
 from uam_sim_bridge.plant.effects import presets

@@ -16,8 +16,7 @@ from uam_lab.cli.command import Command, Subcommands
 from uam_lab.cli.fly import fly, missed_margins
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.node_options import SettingsError
-from uam_lab.flights.vehicle.lab_file import load_lab, template
-from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
 from uam_lab.records.results.result_folder import in_a_name, new_folder
 from uam_lab.records.results.terminal import say
 

@@ -21,8 +21,8 @@ from ctypes import (
 
 from rclpy.subscription import Subscription
 
-from uam_msgs_py.node.librcl import OK, rcl, rcutils
-
+rcl, rcutils = ctypes.CDLL("librcl.so"), ctypes.CDLL("librcutils.so")  # rclpy has loaded them
+OK = 0  # RCL_RET_OK and RMW_RET_OK
 GID_SIZE = 16  # RMW_GID_STORAGE_SIZE
 
 

@@ -36,8 +36,8 @@ from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
 )
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
-from uam_sim_bridge.laboratory import hands
 from uam_sim_bridge.laboratory.hil_line import HilLine
+from uam_sim_bridge.laboratory.person import Grip, joint_torque, wrench
 from uam_sim_bridge.laboratory.tracked_room import RoomBody
 from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain, mistaken_room
 from uam_sim_bridge.mavlink.hil.hil_server import HilServer
@@ -108,7 +108,7 @@ class Laboratory:
         warm_up(plant_class(plant)(vehicle, payload_mass, seed, start))
         self.devices = devices
         self.wiring = wiring or Schedule()
-        self.grip = hands.Grip()
+        self.grip = Grip()
         self.folded = np.array(start or vehicle.description.stowed, dtype=float)
         self._driven = False  # whether the servos have had a command
         self._weight = vehicle.numbers["mass"] * vehicle.numbers["gravity"]
@@ -187,13 +187,13 @@ class Laboratory:
         joints = self.grip.joints
         if joints is None and not self._driven:
             joints = self.folded
-        self._hand = hands.joint_torque(hands.Grip(joints=joints), truth.state)
+        self._hand = joint_torque(Grip(joints=joints), truth.state)
         if self._in_position_mode:
             if joints is not None:
                 command = np.where(np.isnan(command), joints, command)
         else:
             command = command + self._hand
-        self.plant.push(*hands.wrench(self.grip, truth.state, self._weight))
+        self.plant.push(*wrench(self.grip, truth.state, self._weight))
         # the gripper's servo has a goal of its own
         self.plant.step(motors, command, self.magnet and not self._fingers.shafts)
 

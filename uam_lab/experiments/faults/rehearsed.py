@@ -17,8 +17,7 @@ from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.engine import fly
 from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
-from uam_lab.flights.vehicle.lab_file import load_lab
-from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.lab_file import load_lab, settings_of
 from uam_lab.records.results.outcome import Outcome
 from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.faults.schedule import FROM_START

@@ -5,21 +5,23 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import queue
+import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from distributed import CancelledError, Client, Future
+from distributed import CancelledError, Client, Future, get_worker
 from distributed.scheduler import KilledWorker
 
-from uam_lab.experiments.workers import task
-from uam_lab.experiments.workers.identity import identity
+from uam_lab.experiments.workers.identity import difference, identity
 from uam_lab.experiments.workers.local_cluster import local_cluster
 from uam_lab.experiments.workers.place import WorkersError, Workplace
 
+_prepared: set[str] = set()
+_one_at_a_time = threading.Lock()
 PER_WORKER = 3  # one that is computed, and two that need no further message to begin
 LOST_AT_MOST = 20  # workers that one item may lose; after that the item itself is the cause
 CONNECTING = 15.0  # [s] for the scheduler to answer
@@ -27,6 +29,29 @@ GONE = 60.0  # [s] without the scheduler, after which the command ends
 RECEIVING = 20.0  # [s] for a result; after that its worker counts as lost
 POLL = 1.0  # [s] between two looks at the number of workers
 WAITING = 10.0  # [s] without a worker, after which the user is told
+
+
+def run_item(
+    work: Callable[[Any], Any],
+    item: Any,
+    expected: Mapping[str, str],
+    prepare: Callable[[], None] | None,
+) -> Any:
+    """Return work(item). expected: `identity` of the process that handed it out.
+
+    prepare: is called once in this process, before its first item. Raises WorkersError if this
+    worker has other versions.
+    """
+    other = difference(expected, identity())
+    if other:
+        raise WorkersError(
+            f"worker {get_worker().address} has {other}: install the same on every worker"
+        )
+    with _one_at_a_time:
+        if prepare is not None and prepare.__qualname__ not in _prepared:
+            prepare()
+            _prepared.add(prepare.__qualname__)
+    return work(item)
 
 
 class Window:
@@ -189,7 +214,7 @@ class _Run:
     def _submit(self, number: int, item: Any) -> None:
         self._submitted += 1
         future = self._client.submit(
-            task.run,
+            run_item,
             self._work,
             item,
             self._expected,

@@ -12,18 +12,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from uam_control.mission.mission_output import PHASES
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_control.supervision import State
 from uam_control.supervision.preflight import UNKNOWN
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import conclude
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
-from uam_lab.flights.library.errors import CommandRefused, FlightEnded, FlightError, NotInTime
+from uam_lab.flights.library.errors import CommandRefused, FlightEnded, FlightError
 from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
-from uam_lab.flights.library.history import Condition, History
+from uam_lab.flights.library.history import Awaited, History, Kind, awaited
 from uam_lab.flights.observer import FlightStatus, Observer
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.records.results.outcome import Outcome
@@ -37,8 +35,7 @@ if TYPE_CHECKING:
 
 CONNECTED = 60.0  # [s] of wall time for the nodes to find each other before a command
 START_PATIENCE = 10.0  # [s] of wall time for the first values of the pre-arm report
-POLL = 0.05  # [s] between two looks of a waiting coroutine
-Kind = str | Condition
+POLL = 0.05  # [s] between two tries of a start
 Engine = Callable[[FlightSettings, ResultFolder, Observer, StopRequest], Outcome]
 
 
@@ -171,7 +168,7 @@ class Flight:
     async def wait_async(self, timeout: float | None = None) -> FlightResult:
         """Return as `wait`, without blocking the event loop."""
         self._launched()
-        await self._poll(lambda: self._history.over, timeout, "end of the flight")
+        await self._history.wait_async(lambda: self._history.over, timeout, "end of the flight")
         return self._finished()
 
     def wait_for(self, what: Kind, timeout: float | None = None) -> FlightStatus:
@@ -188,38 +185,19 @@ class Flight:
     async def wait_for_async(self, what: Kind, timeout: float | None = None) -> FlightStatus:
         """Return as `wait_for`, without blocking the event loop."""
         watch = self._waiting(what)
-        await self._poll(watch.done, timeout, watch.name)
+        await self._history.wait_async(watch.done, timeout, watch.name)
         return self._met(watch)
 
-    def _met(self, watch: _Wait) -> FlightStatus:
+    def _met(self, watch: Awaited) -> FlightStatus:
         """Return the status that was waited for. Raises FlightEnded."""
         if watch.status is None:
             self._raise_error()
             raise FlightEnded(f"the flight ended before {watch.name}: {self._end()}")
         return watch.status
 
-    async def _poll(self, done: Callable[[], bool], timeout: float | None, what: str) -> None:
-        loop = asyncio.get_running_loop()
-        end = None if timeout is None else loop.time() + timeout
-        while not done():
-            if end is not None and loop.time() > end:
-                raise NotInTime(f"{what}: not within {timeout:g} s; {self._history.summary}")
-            await asyncio.sleep(POLL)
-
-    def _waiting(self, what: Kind) -> _Wait:
+    def _waiting(self, what: Kind) -> Awaited:
         self._need_nodes("wait for a phase")
-        if callable(what):
-            return _Wait(self._history, what, "the condition")
-        phases = dict.fromkeys([*(name for _, name in self.settings.scenario.phases), *PHASES])
-        states = [state.value for state in State]
-        if what not in phases and what not in states:
-            raise SettingsError(
-                f"unknown phase or state '{what}'; there are the phases {', '.join(phases)} and "
-                f"the states {', '.join(states)}"
-            )
-        return _Wait(
-            self._history, lambda status: what in (status.phase, status.state), f"'{what}'"
-        )
+        return awaited(self._history, what, [name for _, name in self.settings.scenario.phases])
 
     # --- what is known ---------------------------------------------------------------------
 
@@ -403,19 +381,6 @@ class Flight:
         if self._result is None:
             return str(self._error)
         return self._result.reason or "mission completed"
-
-
-class _Wait:
-    """Waits for a status of a kind, or for the end of the flight; status: None at its end."""
-
-    def __init__(self, history: History, condition: Condition, name: str) -> None:
-        self._history, self._condition, self.name = history, condition, name
-        self.status: FlightStatus | None = None
-
-    def done(self) -> bool:
-        """Return whether there is such a status, or the flight is over."""
-        self.status = self._history.found(self._condition)
-        return self.status is not None or self._history.over
 
 
 def _engine(name: str) -> Engine:

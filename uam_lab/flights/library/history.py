@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
+from uam_control.mission.mission_output import PHASES
+from uam_control.supervision import State
 from uam_lab.flights.library.errors import NotInTime
+from uam_lab.flights.node_options import SettingsError
 from uam_lab.flights.observer import DeviceState, FlightStatus, Observer
 
 Condition = Callable[[FlightStatus], bool]
-
+Kind = str | Condition
+POLL = 0.05  # [s] between two looks of a waiting coroutine
 KEPT = 4000  # statuses, of half an hour of flight: a flight may last for many hours
 
 
@@ -96,6 +101,15 @@ class History(Observer):
                     raise NotInTime(f"{what}: not within {timeout:g} s; {self.summary}")
                 self._news.wait(left)
 
+    async def wait_async(self, done: Callable[[], bool], timeout: float | None, what: str) -> None:
+        """Wait as `wait`, without blocking the event loop."""
+        loop = asyncio.get_running_loop()
+        end = None if timeout is None else loop.time() + timeout
+        while not done():
+            if end is not None and loop.time() > end:
+                raise NotInTime(f"{what}: not within {timeout:g} s; {self.summary}")
+            await asyncio.sleep(POLL)
+
     @property
     def summary(self) -> str:
         """The newest status, or message before the first, as one line."""
@@ -103,3 +117,30 @@ class History(Observer):
             return self.messages[-1] if self.messages else "the flight has not started"
         status = self.statuses[-1]
         return f"the flight is in phase {status.phase}, {status.state or status.autopilot}"
+
+
+class Awaited:
+    """A status of a kind that is waited for; `status`: None if the flight ends before."""
+
+    def __init__(self, history: History, condition: Condition, name: str) -> None:
+        self._history, self._condition, self.name = history, condition, name
+        self.status: FlightStatus | None = None
+
+    def done(self) -> bool:
+        """Return whether there is such a status, or the flight is over."""
+        self.status = self._history.found(self._condition)
+        return self.status is not None or self._history.over
+
+
+def awaited(history: History, what: Kind, of_scenario: Iterable[str]) -> Awaited:
+    """Return what is waited for; of_scenario: names of its phases. Raises SettingsError."""
+    if callable(what):
+        return Awaited(history, what, "the condition")
+    phases = dict.fromkeys([*of_scenario, *PHASES])
+    states = [state.value for state in State]
+    if what not in phases and what not in states:
+        raise SettingsError(
+            f"unknown phase or state '{what}'; there are the phases {', '.join(phases)} and "
+            f"the states {', '.join(states)}"
+        )
+    return Awaited(history, lambda status: what in (status.phase, status.state), f"'{what}'")

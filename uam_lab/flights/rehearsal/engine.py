@@ -34,7 +34,7 @@ from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.status_listener import StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.flights.vehicle.lab_settings import settings_of
+from uam_lab.flights.vehicle.lab_file import settings_of
 from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_engine import start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from uam_control.laws import catalogue
 from uam_control.mission import ScenarioError
 from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnetParameters
 from uam_control.profiles.profile import BRIDGE, NODES, ProfileError, load_profile, servo_mode
@@ -18,6 +19,8 @@ from uam_control.settings.parameter_set import ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, VehicleError, load_description
+from uam_lab.flights import flight_settings
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.node_options import FLIGHT_CONTROLLER, SettingsError
 from uam_lab.flights.vehicle.lab import (
     AUTOPILOT,
@@ -32,7 +35,6 @@ from uam_lab.flights.vehicle.lab import (
     Page,
     Room,
 )
-from uam_lab.flights.vehicle.lab_settings import settings_of
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, chain_file, load_chain
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.magnet.lines import LineParameters
@@ -43,6 +45,13 @@ from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
 from uam_sim_bridge.ports import PortError
 
+SHARED = (
+    *NODES,
+    BRIDGE,
+    "recorder",
+    "cockpit",
+    FLIGHT_CONTROLLER,
+)  # nodes that a flight in simulation has, too
 FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
 OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout", "gcs", "autopilot_system")
@@ -52,6 +61,37 @@ GEOFENCE = ("geofence_low", "geofence_high")
 ARM_DRIVER = "arm_driver"
 # in `nodes`
 TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit", FLIGHT_CONTROLLER)
+
+
+def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSettings:
+    """Return the checked settings; the room is the supervisor's geofence.
+
+    The scenario must be feasible within the room from a take-off at its origin. The mission waits
+    for the command start. Raises what `flight_settings.settings` raises.
+    """
+    given = {node: values for node, values in lab.nodes.items() if node in SHARED}
+    fence = {"geofence_low": list(lab.room.low), "geofence_high": list(lab.room.high)}
+    given["mission"] = given.get("mission", {}) | fence
+    law = catalogue.DEFAULT
+    if lab.profile:
+        law = load_profile(*lab.profile, vehicle=lab.vehicle).laws()["position_controller"]
+    return flight_settings.settings(
+        scenario=lab.scenario,
+        profile=list(lab.profile) or None,
+        controller=law,
+        vehicle=lab.vehicle.source,
+        clock="realtime",
+        imu=lab.imu,
+        autopilot=lab.autopilot,
+        gcs=lab.gcs,
+        auto_start=False,
+        dry_run=dry_run,
+        view=True,
+        parameters=given,
+        process=lab.process,
+        command=command,
+        fused=lab.fused,
+    )
 
 
 def template() -> str:

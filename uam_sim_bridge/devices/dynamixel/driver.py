@@ -20,7 +20,7 @@ import numpy as np
 
 from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
-from uam_sim_bridge.devices.dynamixel import latency_timer, startup
+from uam_sim_bridge.devices.dynamixel import startup
 from uam_sim_bridge.devices.dynamixel.budget import GRIPPER_GOAL, Budget, budget
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
 from uam_sim_bridge.devices.dynamixel.chain import (
@@ -33,7 +33,7 @@ from uam_sim_bridge.devices.dynamixel.goals import Command, goal_current, goal_p
 from uam_sim_bridge.devices.dynamixel.health import CycleMeter, ServoHealth
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.dynamixel.upkeep import Upkeep
-from uam_sim_bridge.devices.serial.serial_port import SerialPort
+from uam_sim_bridge.devices.serial.serial_port import SerialPort, advice, latency_timer
 from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, tried
 
 STATE = (names.PRESENT_POSITION, names.PRESENT_VELOCITY, names.PRESENT_CURRENT)
@@ -83,7 +83,7 @@ class ArmDriver:
         self._span = _common_span(chain)
         if self.in_position_mode:
             startup.check_turn(chain)
-        self.latency_timer = latency_timer.latency_timer(chain.device)
+        self.latency_timer = latency_timer(chain.device)
         wait = parameters.answer_timeout + 2.0 * (self.latency_timer or 0.0) + chain.return_delay
         self.bus = DynamixelBus(chain.device, chain.baud_rate, wait, port)
         self._upkeep = Upkeep(
@@ -241,7 +241,7 @@ class ArmDriver:
         if self.latency_timer is not None and self.latency_timer > NEEDED_LATENCY:
             found.append(
                 f"{device}: latency timer {1e3 * self.latency_timer:g} ms, 1 ms is needed: "
-                f"{latency_timer.advice(device)}"
+                f"{advice(device)}"
             )
         if self.budget.rate < self.rate:
             found.append(

@@ -6,11 +6,13 @@ import contextlib
 import select
 import termios
 import time
+from pathlib import Path
 
 import serial
 
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 CHUNK = 4096  # bytes per read
+SYSFS = Path("/sys/bus/usb-serial/devices")
 
 
 class SerialPort:
@@ -64,3 +66,18 @@ class SerialPort:
             if data or left <= 0.0:
                 return data
             select.select([self._serial], [], [], left)
+
+
+def latency_timer(device: str, sysfs: Path = SYSFS) -> float | None:
+    """Return the latency timer [s] of a serial device; None for an adapter without one."""
+    file = sysfs / Path(device).resolve().name / "latency_timer"
+    try:
+        return 1e-3 * int(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def advice(device: str) -> str:
+    """Return the command that sets the timer to 1 ms."""
+    name = Path(device).resolve().name
+    return f"echo 1 | sudo tee {SYSFS}/{name}/latency_timer"

@@ -30,8 +30,7 @@ from collections.abc import Sequence
 from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, fill_ports, number
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
-from uam_sim_bridge.mavlink.transport.outbox import Outbox
-from uam_sim_bridge.mavlink.transport.pacing import Meter
+from uam_sim_bridge.mavlink.transport.pacing import Meter, Outbox
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, Transport, open_transport
 from uam_sim_bridge.ports import PortError
 
