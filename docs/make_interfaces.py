@@ -10,7 +10,7 @@ from uam_msgs_py.messages.serialized import type_name
 PAGE = Path(__file__).with_name("interfaces.md")
 BEGIN, END = "<!-- made by docs/make_interfaces.py -->\n", "<!-- end -->\n"
 HEAD = ("topic", "type", "QoS", "frame: unit", "rate", "publisher", "who needs it")
-USUAL = "reliable, 32"
+USUAL = {"latched": 1}  # depths that are not written; else 32
 
 
 def table() -> str:
@@ -42,9 +42,10 @@ def _row(topic: topics.Topic) -> tuple[str, ...]:
 
 def _qos(topic: topics.Topic) -> str:
     offered = topic.qos
-    latched = ", latched" if offered.durability.name == "TRANSIENT_LOCAL" else ""
-    reliable = offered.reliability.name.lower().replace("_", " ")
-    return f"{reliable}{latched}, {offered.depth}".replace(USUAL, "")
+    kind = "latched" if offered.durability.name == "TRANSIENT_LOCAL" else ""
+    kind = kind or "best effort" * (offered.reliability.name == "BEST_EFFORT")
+    depth = "" if offered.depth == USUAL.get(kind, 32) else str(offered.depth)
+    return ", ".join(filter(None, (kind, depth)))
 
 
 if __name__ == "__main__":
