@@ -221,6 +221,17 @@ def test_a_joint_whose_link_falls_over_gets_faster_other_loops_slower():
     assert after.attitude / before.attitude == pytest.approx([0.92, 0.92, 1.0])
 
 
+def test_the_rate_loop_is_mended_before_the_loops_around_it():
+    """With 20 dB asked for, roll lacks gain margin, too; and one point tells enough."""
+    criteria = load_criteria()
+    criteria.margins.gain = 20.0
+    found = search.Search(load_description(), criteria).evaluated()
+    assert {*found.faults} == {search.RATES}
+    assert len(found.cases) == 1
+    roll = found.cases[0].analysis.loops["roll"][1]
+    assert search.shortfall(roll, criteria.margins, joint=False) is not None
+
+
 def test_a_real_vehicle_without_its_margins_does_not_start(tmp_path, capsys, monkeypatch):
     lab, line = tmp_path / "lab.yaml", "profile s500 on s500_arm, no payload: unstable"
     lab.write_text(template())
