@@ -105,13 +105,22 @@ def test_the_page_marks_errors_above_the_papers_and_shows_the_abort_reason(fligh
     assert "missed control ticks 7" in words
 
 
-def test_a_flight_that_was_not_completed_is_not_compared(flight_folder):
-    change_metrics(flight_folder, mission_completed=False, abort_reason="tilt")
+@pytest.mark.parametrize(
+    ("changes", "headline"),
+    [
+        ({"mission_completed": False, "abort_reason": "tilt"}, "Mission aborted"),
+        ({"scenario": "lemniscate"}, "Mission completed"),
+    ],
+)
+def test_an_incomplete_flight_and_another_mission_are_not_compared(
+    flight_folder, changes, headline
+):
+    change_metrics(flight_folder, **changes)
     words = text_of(flight_page.write_page(flight_folder).read_text())
     out = io.StringIO()
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     Terminal(file=out, width=100).print(console.summary(metrics))
-    assert "Mission aborted" in words
+    assert headline in words
     for text in (words, out.getvalue()):
         assert " ".join(text.split()).count("errors are not compared with those of the paper") == 1
         assert not any(word in text for word in ("better", "worse", "equal"))

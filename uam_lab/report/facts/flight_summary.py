@@ -40,9 +40,13 @@ class ErrorRow:
 
 def not_compared(metrics: Mapping[str, Any]) -> str:
     """Return why the errors are not compared with the paper's, "" if they are."""
-    if metrics["mission_completed"]:
-        return ""
-    return "The flight was not completed: its errors are not compared with those of the paper."
+    if not metrics["mission_completed"]:
+        return "The flight was not completed: its errors are not compared with those of the paper."
+    if metrics.get("scenario") != paper.SCENARIO:
+        return (
+            "The paper flew another mission: the errors are not compared with those of the paper."
+        )
+    return ""
 
 
 def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+SCENARIO = "pick_and_place"  # the mission of the figures
 RMS = {
     "position_m": (0.05, 0.02, 0.09),
     "attitude_deg": (3.11, 2.81, 3.01),

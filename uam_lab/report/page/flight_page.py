@@ -17,7 +17,6 @@ from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.page.figure_entries import figure_entries
 from uam_lab.report.video.flight_video import Rendered, existing
 
-PAPER_SCENARIO = "pick_and_place"
 FACTS = (
     ("controller", "controller"),
     ("profile", "profile"),
@@ -77,7 +76,6 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         faults=fault_marks.rows(info),
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
         controller=controller,
-        papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
         strip=_embedded(rendered.strip),
         video=_embedded(rendered.video),
         poster=_embedded(_middle(rendered.snapshots)),
