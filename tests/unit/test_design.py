@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 import yaml
@@ -12,11 +13,18 @@ from hypothesis import strategies as st
 
 from uam_control.profiles.profile import ProfileError, default_profile
 from uam_control.vehicle import VehicleError, derived_parameters, load_description
+from uam_lab.analysis.dynamics import Body
 from uam_lab.cli import vehicle
 from uam_lab.cli.main import main
 from uam_lab.experiments.design import search
 from uam_lab.experiments.design.criteria import DesignError, load_criteria
-from uam_lab.experiments.design.facts import Facts, inertias, largest_torque, noise_gains
+from uam_lab.experiments.design.facts import (
+    Facts,
+    inertias,
+    largest_torque,
+    noise_gains,
+    standing_torque,
+)
 from uam_lab.experiments.design.gains import thrust_response
 from uam_lab.experiments.design.rate_loop import rate_loop
 from uam_lab.experiments.margins.kept import missed
@@ -90,6 +98,26 @@ def test_torque_in_hover_of_the_s500():
     room = 8.549e-6 * 1100.0**2 - 2.2 * 9.81 / 4.0
     found = largest_torque(load_description())
     assert found == pytest.approx([4 * 0.171 * room] * 2 + [4 * 0.016 * room])
+
+
+def test_torque_that_holds_a_level_vehicle_is_that_of_the_model():
+    """MuJoCo's generalised force about the base against gravity; the rotors' middle is at x = 0."""
+    made = Vehicle.load("s500_arm")
+    body = Body(made)
+    for arm in (made.description.stowed, (0.7, 0.7), (-0.5, 1.2)):
+        body.place(np.array([*np.zeros(6), *arm]))
+        mujoco.mj_forward(body.model, body.data)
+        force = body.data.joint("base").qfrc_bias[3:6]
+        assert standing_torque(made, arm) == pytest.approx(force, abs=1e-9)
+        assert abs(force[1]) > 0.01
+
+
+def test_a_vehicle_that_its_arm_turns_over_is_refused_at_once():
+    """The stowed arm of the S-500 takes 0.16 N m in pitch; 1 % of the largest torque is 0.034."""
+    criteria = load_criteria()
+    criteria.authority.torque = [0.01, 0.01, 0.9]
+    with pytest.raises(DesignError, match=r"stowed, arm at 0, 90 deg: level hover needs 0.16 N m"):
+        search.design(load_description("s500_arm"), criteria)
 
 
 def test_inertia_of_a_vehicle_over_the_poses():

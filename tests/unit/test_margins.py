@@ -1,6 +1,7 @@
 """Margins worked by hand, blocks and their connection, and the model of the stack."""
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -309,3 +310,13 @@ def test_the_margin_of_the_profile_is_judged():
     assert verdict(0.06, 0.06) == "as computed"
     assert "too large" in verdict(0.07, 0.06)
     assert "smaller than necessary" in verdict(0.03, 0.06)
+
+
+def test_a_loop_that_acts_on_nothing_has_no_crossing_and_no_warning():
+    """A law at its limit answers nothing: L = 0, here from the middle frequency on."""
+    omega = np.geomspace(0.1, 100.0, 50)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = margins(omega, np.where(omega < 3.0, 0.5 + 0.0j, 0.0j))
+    assert found.delay == found.gain_down == math.inf
+    assert found.peak == 1.0

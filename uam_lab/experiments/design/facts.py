@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
@@ -109,6 +110,21 @@ def inertia_at(body: Body, arm: tuple[float, ...]) -> np.ndarray:
         mass[POSITION, POSITION], mass[POSITION, ATTITUDE]
     )
     return np.concatenate([np.diag(mass[ATTITUDE, ATTITUDE] - across), np.diag(mass)[ARM]])
+
+
+def standing_torque(vehicle: Vehicle, arm: tuple[float, ...]) -> np.ndarray:
+    """Return the torque (3,) [N m] about roll, pitch, yaw with which rotors of different thrust
+    hold the vehicle level; arm (n,) [rad]."""
+    body, described = Body(vehicle), vehicle.description
+    chi = np.zeros(body.size)
+    chi[ARM] = arm
+    body.place(chi)
+    mujoco.mj_kinematics(body.model, body.data)
+    mujoco.mj_comPos(body.model, body.data)
+    base = body.model.body("base").id
+    centre = body.data.subtree_com[base] - body.data.xpos[base]
+    middle = np.mean([rotor.position for rotor in described.rotors], axis=0)
+    return np.cross(centre - middle, [0.0, 0.0, described.mass * described.gravity])
 
 
 def largest_torque(described: VehicleDescription) -> np.ndarray:

@@ -22,7 +22,7 @@ from uam_control.estimation import EstimatorParameters
 from uam_control.profiles.profile import Profile, ProfileError, profile_of
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.design.criteria import DesignError
-from uam_lab.experiments.design.facts import Facts, payload
+from uam_lab.experiments.design.facts import Facts, payload, standing_torque
 from uam_lab.experiments.design.gains import (
     Bandwidths,
     autopilot_gains,
@@ -107,10 +107,25 @@ class Search:
     def __init__(self, described: VehicleDescription, criteria: SimpleNamespace) -> None:
         self._described, self._criteria = described, criteria
         self.facts = Facts.of(Vehicle.of(described))
+        self._refuse_unbalanced()
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
         self._points = self._operating_points()
+
+    def _refuse_unbalanced(self) -> None:
+        """Raise DesignError where level hover takes all torque that the attitude law may give."""
+        allowed = np.array(self._criteria.authority.torque) * self.facts.torque
+        for label, arm in self.facts.poses.items():
+            needed = np.abs(standing_torque(Vehicle.of(self._described), arm))
+            for name, one, most in zip(("roll", "pitch"), needed, allowed, strict=False):
+                if one >= most:
+                    angles = ", ".join(f"{angle:.0f}" for angle in np.degrees(arm))
+                    raise DesignError(
+                        f"{self._described.name}: {label}, arm at {angles} deg: level hover needs "
+                        f"{one:.2g} N m in {name}, the attitude controller may give {most:.2g}: a "
+                        "lighter arm or smaller range, or rotors farther out or stronger"
+                    )
 
     def bandwidths(self) -> Bandwidths:
         """Return the bandwidths: what the formulas allow, times the share of each loop."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TINY = 1e-30  # of an eigenvalue
+TINY = 1e-30  # of a loop or an eigenvalue: one that acts on nothing is 0
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Margins:
 
 def margins(omega: np.ndarray, loop: np.ndarray) -> Margins:
     """Return the margins of L (k,), complex, at the ascending frequencies omega (k,) [rad/s]."""
-    size, angle = np.log(np.abs(loop)), np.unwrap(np.angle(loop))
+    size, angle = np.log(np.maximum(np.abs(loop), TINY)), np.unwrap(np.angle(loop))
     phases, delays, at = [], [], math.nan
     for i, share in _crossings(size):
         at = _between(np.log(omega), i, share)
@@ -48,7 +48,7 @@ def margins(omega: np.ndarray, loop: np.ndarray) -> Margins:
     for whole in range(math.ceil(turned.min()), math.floor(turned.max()) + 1):
         gains += [-_between(size, i, share) for i, share in _crossings(turned - whole)]
     decibel = 20.0 / math.log(10.0)
-    closed = np.log(np.abs(loop / (1.0 + loop))) + 0.5 * math.log(2.0)
+    closed = np.log(np.maximum(np.abs(loop / (1.0 + loop)), TINY)) + 0.5 * math.log(2.0)
     ends = [math.exp(_between(np.log(omega), i, s)) for i, s in _crossings(closed)]
     return Margins(
         crossover=at,
