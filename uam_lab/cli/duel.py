@@ -32,7 +32,7 @@ def add(commands: Subcommands) -> None:
         "platform and heading beside the published ones, standing offset and survived delay.",
         EXAMPLES,
     )
-    text = "a duel of config/duel, or a file (default: fsc_lab)"
+    text = "a duel of config/duel, or a file"
     command.option("name", "NAME|FILE", text, "fsc_lab", nargs="?")
     command.option("--seeds", "N", "seeds 1..N (default: the duel's)", type=count)
     command.option("--rows", "LABEL", "rows that fly (default: all)", nargs="+")
