@@ -119,6 +119,17 @@ def test_the_printed_law_with_table_1_stays_on_the_ground():
     assert a_flight.control.position.controller.parameters.safeguards == []
 
 
+@pytest.mark.long
+def test_the_printed_law_alone_lifts_the_payload_and_places_it():
+    """docs/adaptation.md: with the position loop of the study it gives up."""
+    a_flight = flight(profile="paper_pure")
+    a_flight.run()
+    result = metrics(a_flight)
+    assert result["mission_completed"], result["shortfalls"]
+    assert result["payload_lifted"] and result["payload_place_error_m"] < 0.06
+    assert result["rms"]["position_m"][0] > 0.005  # nothing integrates: a moment leaves an error
+
+
 def test_the_bridge_uses_its_section_of_the_profile():
     profile = load_profile("s500")
     section = {"thrust_max": 30.0, "stream_time": 2.0, "local_port": 14999}
