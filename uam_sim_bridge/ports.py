@@ -12,7 +12,6 @@ import stat
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 SIMULATOR_TCP, OFFBOARD_UDP, AUTOPILOT_UDP = 4560, 14540, 14580  # PX4's own, instance 0
@@ -237,12 +236,7 @@ class Reservation:
     def __enter__(self) -> "Reservation":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.release()
 
 

@@ -12,19 +12,16 @@ MAV_CMD_DO_SET_ACTUATOR.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleDescription, VehicleError, load_description
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.mavlink.transport.transport import parse_url
-from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.process import Px4Process, add_px4_options, run
-from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
+from uam_sim_bridge.px4.process import How, Px4Process, add_px4_options, command
+from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Installation
 
 NAME = "px4_hitl"
 MAVLINK = "px4-rc.mavlink"  # PX4's script that starts the links
@@ -118,22 +115,12 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run PX4 until interrupted; return the exit status.
-
-    0: interrupted; PX4's status if PX4 ended by itself; 2: no PX4 or wrong use. If a signal ended
-    PX4, the same signal ends this process.
-    """
-    options = parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    try:
-        line = parse_url(f"serial:{options.companion}")
-        installation = Px4Installation.in_the_loop(options.px4_dir)
-        vehicle = load_description(options.vehicle)
-        given = parameters.load(vehicle, options.params, options.param, installation.ranges())
-    except (Px4Error, ConfigurationError, VehicleError, PortError) as error:
-        print(f"{NAME}: {error}", file=sys.stderr, flush=True)
-        return 2
+def prepared(options: argparse.Namespace) -> How:
+    """Return how PX4 runs. Raises what `command` reports."""
+    line = parse_url(f"serial:{options.companion}")
+    installation = Px4Installation.in_the_loop(options.px4_dir)
+    vehicle = load_description(options.vehicle)
+    given = parameters.load(vehicle, options.params, options.param, installation.ranges())
     values = loop_values(given, vehicle)
     scripts = {
         parameters.STARTED_LATE: start_script(values),
@@ -141,7 +128,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     }
     variables = parameters.environment(values)
     start = partial(Px4Process, installation, options.instance, scripts, variables)
-    return run(NAME, start, options.log)
+    return How(start, options.log)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run PX4 until interrupted; return the exit status, see `command`."""
+    return command(NAME, parser().parse_args(arguments), prepared)
 
 
 if __name__ == "__main__":

@@ -12,9 +12,13 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleError
+from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.px4_installation import Px4Installation
+from uam_sim_bridge.px4.px4_installation import Px4Error, Px4Installation
 
 PATIENCE = 2.0  # s between SIGINT and SIGKILL; PX4 cannot end while its clock is stopped
 LOG_SUFFIX = ".ulg"
@@ -143,39 +147,48 @@ def end_of_all(px4: Px4Process) -> bool:
     return False
 
 
-def run(
-    program: str,
-    start: Callable[[Path], Px4Process],
-    log: Path | None,
-    over: Callable[[Px4Process], bool] = end_of_all,
-    anew: str = "",
+class How(NamedTuple):
+    """How PX4 runs. start: returns a running PX4 in the given new folder; log: where its logs are
+    kept, if at all; over: waits for the end, and returns whether PX4 is started anew (by default
+    never); anew: said then."""
+
+    start: Callable[[Path], Px4Process]
+    log: Path | None
+    over: Callable[[Px4Process], bool] = end_of_all
+    anew: str = ""
+
+
+def command(
+    program: str, options: argparse.Namespace, prepared: Callable[[argparse.Namespace], How]
 ) -> int:
     """Run PX4 until interrupted; return the exit status of `program`.
 
-    start: returns a running PX4 in the given new folder; log: where its logs are kept, if at all;
-    over: waits for the end, and returns whether PX4 is started anew (by default never); anew: said
-    then.
-
-    0: interrupted; PX4's status if PX4 ended by itself. If a signal ended PX4, the same signal ends
-    this process.
+    0: interrupted; PX4's status if PX4 ended by itself; 2: no PX4 or wrong use. If a signal ended
+    PX4, the same signal ends this process.
     """
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        how = prepared(options)
+    except (Px4Error, ConfigurationError, VehicleError, PortError) as error:
+        print(f"{program}: {error}", file=sys.stderr, flush=True)
+        return 2
     kept: list[Path] = []
     again = True
     while again:
         with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
-            px4 = start(Path(folder))
+            px4 = how.start(Path(folder))
             try:
                 with px4:
-                    again = over(px4)
+                    again = how.over(px4)
                 status = px4.process.returncode
             except KeyboardInterrupt:
                 return 0
             finally:
-                if log is not None:
-                    kept += (new := keep(px4.logs(), log, len(kept) + 1))
+                if how.log is not None:
+                    kept += (new := keep(px4.logs(), how.log, len(kept) + 1))
                     say_kept(program, new)
         if again:
-            print(f"{program}: {anew}", flush=True)
+            print(f"{program}: {how.anew}", flush=True)
     return ended(program, status)
 
 

@@ -10,7 +10,6 @@ it anew for the next simulator.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -18,14 +17,13 @@ from functools import partial
 
 import psutil
 
-from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleError, load_description
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.ports import SIMULATOR_TCP
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.process import Px4Process, add_px4_options, run
-from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.process import How, Px4Process, add_px4_options, command
+from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Installation
 
 NAME = "px4_sitl"
 HUNG_UP = "the simulator hung up; PX4 starts anew for the next one"
@@ -89,27 +87,22 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run PX4 until interrupted, anew for each simulator; return the exit status.
-
-    0: interrupted; PX4's status if PX4 ended by itself; 2: no PX4 or wrong use. If a signal ended
-    PX4, the same signal ends this process.
-    """
-    options = parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    try:
-        installation = Px4Installation.find(options.px4_dir)
-        vehicle = load_description(options.vehicle)
-        given = parameters.load(vehicle, options.params, options.param, installation.ranges())
-        values = parameters.motor_outputs(vehicle) | given
-    except (Px4Error, ConfigurationError, VehicleError) as error:
-        print(f"{NAME}: {error}", file=sys.stderr, flush=True)
-        return 2
+def prepared(options: argparse.Namespace) -> How:
+    """Return how PX4 runs, anew for each simulator. Raises what `command` reports."""
+    installation = Px4Installation.find(options.px4_dir)
+    vehicle = load_description(options.vehicle)
+    given = parameters.load(vehicle, options.params, options.param, installation.ranges())
+    values = parameters.motor_outputs(vehicle) | given
     scripts = {parameters.STARTED_LATE: parameters.start_script(values)}
     variables = parameters.environment(values) | {"PX4_SIM_HOSTNAME": options.sim_host}
     port = None if options.once else SIMULATOR_TCP + options.instance
     start = partial(Px4Process, installation, options.instance, scripts, variables)
-    return run(NAME, start, options.log, lambda px4: until_over(px4, port), HUNG_UP)
+    return How(start, options.log, lambda px4: until_over(px4, port), HUNG_UP)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run PX4 until interrupted; return the exit status, see `command`."""
+    return command(NAME, parser().parse_args(arguments), prepared)
 
 
 if __name__ == "__main__":
