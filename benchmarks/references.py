@@ -17,8 +17,8 @@ from pathlib import Path
 
 from uam_control.mission import ScenarioError
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
-from uam_lab.flights.library.errors import FlightError
 from uam_lab.flights.library.flight import Flight
+from uam_lab.flights.library.flight_result import FlightError
 
 REFERENCES = (
     *("circle", "circle_fast", "circle_payload", "lemniscate", "lemniscate_payload", "arm_sweep"),

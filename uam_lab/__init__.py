@@ -18,11 +18,11 @@ OFFERED = {
     "FlightResult": "flight_result",
     "FlightStatus": "flight",
     "Observer": "flight",
-    "FlightError": "errors",
+    "FlightError": "flight_result",
     "FlightFailed": "flight_result",
-    "FlightEnded": "errors",
-    "CommandRefused": "errors",
-    "NotInTime": "errors",
+    "FlightEnded": "flight_result",
+    "CommandRefused": "flight_result",
+    "NotInTime": "flight_result",
 }
 __all__ = list(OFFERED)
 

@@ -6,11 +6,12 @@ its value and the allowed range. The ROS nodes declare their parameters from the
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -267,3 +268,20 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
     if not np.all((numbers >= spec.low) & (numbers <= spec.high)):  # refuses NaN too
         raise ParameterError(f"{name}: {shown!r} is outside {allowed}")
     return float(numbers) if spec.length is None else tuple(numbers.tolist())
+
+
+class NamedSet(ParameterSet):
+    """Base of sets with a name. A subclass is a frozen dataclass without a decorator.
+
+    NAME: that of the class, `MotorLoss` is `motor_loss`; ABOUT: its docstring in one line, as the
+    description for the user.
+    """
+
+    NAME: ClassVar[str]
+    ABOUT: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        cls.NAME = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+        about = " ".join((cls.__doc__ or "").split()).rstrip(".")
+        cls.ABOUT = about[:1].lower() + about[1:]
+        dataclass(frozen=True)(cls)

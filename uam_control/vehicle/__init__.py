@@ -1,6 +1,6 @@
 """The description of a vehicle: the file in config/vehicle/ and the values derived from it."""
 
-from uam_control.vehicle.chain_reader import chain_and_hinge, chain_of
+from uam_control.vehicle.chain_reader import chain_and_hinge, chain_of, model_spec
 from uam_control.vehicle.derived_parameters import derived_parameters
 from uam_control.vehicle.description import (
     AXES,
@@ -23,4 +23,3 @@ from uam_control.vehicle.loading import (
     designed,
     load_description,
 )
-from uam_control.vehicle.model import model_spec

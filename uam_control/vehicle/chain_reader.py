@@ -9,15 +9,36 @@ import numpy as np
 from uam_control.arm.chain import JOINTS, Chain, with_point
 from uam_control.vehicle.description import VehicleDescription
 from uam_control.vehicle.loading import VehicleError
-from uam_control.vehicle.model import model_spec
 
 if TYPE_CHECKING:
     import mujoco
 
+
+PREFIX = "gripper_"  # of the names of a gripper's parts
 BASE = "base"  # body of the MJCF
 HANDS = "end_effector", "magnet_face"  # sites: the first of them, where the YAML names none
 OUTSIDE, SWINGS, OF_BASE = -2, -1, 0  # owners of a body; the link of joint i, from 1 on, is i
 Lump = tuple[float, np.ndarray, np.ndarray]  # mass [kg], centre (3,) [m], inertia about it (3, 3)
+
+
+def model_spec(vehicle: VehicleDescription) -> mujoco.MjSpec:
+    """Return the MJCF of a vehicle with its gripper. Raises ValueError."""
+    import mujoco  # takes 0.3 s and chooses its renderer: only where a model is read
+
+    spec, g = mujoco.MjSpec.from_file(str(vehicle.model)), vehicle.numbers.get("gripper")
+    if g is None:
+        return spec
+    for name in filter(None, (g["body"], g.get("instead_of"))):
+        if spec.body(name) is None:
+            raise ValueError(f"no body '{name}' for the gripper of {vehicle.file.name}")
+    if g.get("instead_of"):
+        spec.delete(spec.body(g["instead_of"]))
+    part = mujoco.MjSpec.from_file(g["model"])
+    part.geom("body").mass = g["mass"]
+    for name in ("left", "right"):
+        part.geom(name).friction[0] = g["friction"]
+    spec.attach(part, frame=spec.body(g["body"]).add_frame(pos=g["position"]), prefix=PREFIX)
+    return spec
 
 
 def chain_of(vehicle: VehicleDescription) -> Chain:

@@ -11,8 +11,7 @@ from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
 
-from uam_control.settings.named_set import NamedSet
-from uam_control.settings.parameter_set import choice, number
+from uam_control.settings.parameter_set import NamedSet, choice, number
 from uam_sim_bridge.plant import Disturbance, Samples
 
 PLANT, LINK, PROCESS, CABLE = "plant", "MAVLink", "process", "cable"

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_control.vehicle.model import PREFIX
+from uam_control.vehicle.chain_reader import PREFIX
 from uam_sim_bridge.plant.actuators import COUNTS_PER_TURN, P_GAIN_SCALE, PWM_FULL
 
 FINGERS = f"{PREFIX}left", f"{PREFIX}right"

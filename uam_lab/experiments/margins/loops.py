@@ -26,7 +26,6 @@ from uam_lab.experiments.margins.stack_model import RATES, THRUST, Stack, hand_s
 
 LOWEST, FREQUENCIES = 0.05, 1200  # [rad/s] and number, up to half the tick rate
 GROWTH = 1e-3  # [1/s] of a mode that counts as unstable
-SETPOINTS = "setpoints"
 
 
 @dataclass(frozen=True)

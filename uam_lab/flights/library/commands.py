@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from uam_control.profiles.profile import Profile
-from uam_lab.flights.library.errors import CommandRefused, FlightError
+from uam_lab.flights.library.flight_result import CommandRefused, FlightError
 from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.node_environment import transport_environment

@@ -19,8 +19,13 @@ from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import conclude
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
-from uam_lab.flights.library.errors import CommandRefused, FlightEnded, FlightError
-from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
+from uam_lab.flights.library.flight_result import (
+    CommandRefused,
+    FlightEnded,
+    FlightError,
+    FlightFailed,
+    FlightResult,
+)
 from uam_lab.flights.library.history import Awaited, History, Kind, awaited
 from uam_lab.flights.observer import FlightStatus, Observer
 from uam_lab.flights.processes.interrupts import StopRequest

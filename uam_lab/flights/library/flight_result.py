@@ -1,4 +1,4 @@
-"""The result of a flight: metrics, time series, and the folder with all files."""
+"""The result of a flight, and the errors of the library; the text of each is one line."""
 
 from __future__ import annotations
 
@@ -8,12 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from uam_lab.flights.library.errors import FlightError
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.timeseries import PHASE_COLUMN, Series
 
 if TYPE_CHECKING:
     import pandas
+
+
+class FlightError(RuntimeError):
+    """A flight cannot do what was requested."""
+
+
+class FlightEnded(FlightError):
+    """The flight has ended without what was waited for."""
+
+
+class NotInTime(FlightError, TimeoutError):
+    """The flight did not do in time what was waited for."""
+
+
+class CommandRefused(FlightError):
+    """The flight refused a command or a parameter; the text is the reason."""
 
 
 @dataclass(frozen=True)

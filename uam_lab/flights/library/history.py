@@ -11,7 +11,7 @@ from itertools import islice
 
 from uam_control.mission.mission_output import PHASES
 from uam_control.supervision import State
-from uam_lab.flights.library.errors import NotInTime
+from uam_lab.flights.library.flight_result import NotInTime
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.flights.observer import DeviceState, FlightStatus, Observer
 

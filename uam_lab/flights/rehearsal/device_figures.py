@@ -40,7 +40,6 @@ LARGEST: dict[str, dict[str, str]] = {
     "arm_driver": {"bus_cycle_max_ms": "cycle, max [ms]"},
     "mocap_driver": {"mocap_frames_lost": "frames lost"},
 }
-UNITS = {"hz": "Hz", "ms": "ms", "kbyte_s": "kB/s"}
 
 
 def read(log: Path, logs: Path) -> dict[str, Any]:

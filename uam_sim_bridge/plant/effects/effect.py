@@ -16,8 +16,7 @@ import mujoco
 import numpy as np
 
 from uam_control.maths.memory import Number, record
-from uam_control.settings.named_set import NamedSet
-from uam_control.settings.parameter_set import ANY_LENGTH, Bound, number, vector
+from uam_control.settings.parameter_set import ANY_LENGTH, Bound, NamedSet, number, vector
 from uam_sim_bridge.plant.actuators import Rotors
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.sensors import Mocap, Noise
