@@ -438,6 +438,16 @@ def test_a_missing_mesh_of_an_mjcf_is_left_out_where_the_body_has_its_own_mass(t
             imported(tmp_path, given, "x2.xml")
 
 
+def test_what_collides_is_shown_where_nothing_visible_is(tmp_path):
+    """A base whose only shape to look at is invisible, as of a public X2: its box is drawn."""
+    unseen = '<geom type="sphere" size=".05" mass="0" contype="0" conaffinity="0" rgba="0 0 0 0"/>'
+    given = MJCF.replace("<freejoint/>", f"<freejoint/>{unseen}", 1)
+    _, model = imported(tmp_path, given, "x2.xml")
+    own = np.flatnonzero(model.geom_bodyid == model.body("base").id)
+    boxes = own[model.geom_type[own] == mujoco.mjtGeom.mjGEOM_BOX]
+    assert model.geom_size[boxes].tolist() == [[0.1, 0.1, 0.03]]
+
+
 def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):
     with pytest.raises(ImportRefused, match=r"x2.xml line 5: <body pos='0 0 nan'>: finite numbers"):
         imported(tmp_path, MJCF.replace('pos="0 0 -.05"', 'pos="0 0 nan"'), "x2.xml")

@@ -116,7 +116,10 @@ class MjcfText:
         given = {"pos": text(centre), "mass": f"{mass:.9g}", "fullinertia": text(six)}
         etree.SubElement(body, "inertial", given)
         solid = geometry.shapes(self.parts, link, True)
-        seen = geometry.shapes(self.parts, link, False) or solid
+        seen = [g for g in geometry.shapes(self.parts, link, False) if self._rgba(g)[3] > 0.0]
+        body_of = self.parts.model.geom_bodyid
+        bare = {*body_of[solid]} - {*body_of[seen]}  # of the file, without a shape to look at
+        seen += [g for g in solid if body_of[g] in bare and self._rgba(g)[3] > 0.0]
         for geom in seen:
             self._shown(body, link, geom)
         for begin, end, radius in () if seen else self._bars(link, centre):
@@ -144,17 +147,18 @@ class MjcfText:
         model = self.parts.model
         place, axes = self._in(link, *geometry.pose_of(self.parts, geom))
         look = {"pos": text(place), "quat": text(quaternion(axes)), "mass": "0"}
-        material = model.geom_matid[geom]
-        rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-        look["rgba"] = text(rgba)
-        if rgba[3] == 0.0:
-            return
+        look["rgba"] = text(self._rgba(geom))
         kind = KINDS.get(mujoco.mjtGeom(model.geom_type[geom]))
         if kind is None:
             look |= {"type": "mesh", "mesh": self._mesh(int(model.geom_dataid[geom]))}
         else:
             look |= {"type": kind[0], "size": text(model.geom_size[geom][: kind[1]])}
         etree.SubElement(body, "geom", look)
+
+    def _rgba(self, geom: int) -> np.ndarray:
+        model = self.parts.model
+        material = model.geom_matid[geom]
+        return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
 
     def _mesh(self, mesh: int) -> str:
         """Copy the file of a mesh; return its name."""
