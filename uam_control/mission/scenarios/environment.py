@@ -109,6 +109,8 @@ def _place(entry: Section, made: dict[str, Any], before: Sequence[dict[str, Any]
     """Return the middle (3,) [m] of the lower side of an entry; a payload stands on another one."""
     on = None
     if entry.has("rests_on"):
+        if not before:
+            raise entry.error("rests_on", "no entry stands before it")
         names = {one["name"]: one for one in before}
         on = names[entry.one_of("rests_on", tuple(names))]
         if on["kind"] in ("slope", "wall", PAYLOAD):
