@@ -27,6 +27,7 @@ from uam_lab.records.results.outcome import transitions
 from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 TOLERANCE = 2000 * 2.0**-24
 POSE = tuple(f"truth.{name}" for name in BASE_COORDINATES)
@@ -59,6 +60,21 @@ def test_only_single_precision_differs(name, fly, short_scenario):
     direct = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), 0.0, 3, schedule)
     direct.run()
 
+    assert_same_transitions(ros, direct)
+    assert_same_rows(timeseries.read(ros.out / "timeseries.parquet"), direct.recording.series())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", [[], ["--fused"]])
+def test_poses_of_an_odometry_that_drifts_and_jumps(layout, fly, short_scenario):
+    """nav_msgs/Odometry in place of the motion capture, in both layouts."""
+    chosen = ["odometry"], ["odometry_drift:jumps=0.3"]
+    options = ["--plant-preset", *chosen[0], "--effect", *chosen[1], *layout]
+    ros = fly("--scenario", str(short_scenario), "--seed", "3", *options)
+    assert ros.wait() in (0, 1), ros.said + ros.complained  # 1: a jump moved the landing, too
+    vehicle = Vehicle.load().changed(presets.added({}, presets.read(*chosen)))
+    direct = DirectFlight(load_scenario(str(short_scenario)), load_profile("s500"), vehicle, 0.0, 3)
+    direct.run()
     assert_same_transitions(ros, direct)
     assert_same_rows(timeseries.read(ros.out / "timeseries.parquet"), direct.recording.series())
 
