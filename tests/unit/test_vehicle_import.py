@@ -121,6 +121,14 @@ def test_an_arm_whose_meshes_are_missing_is_above_the_feet_and_shown(tmp_path):
     assert np.linalg.norm(here.body("magnet").xpos - middle) < radius < 1.0
 
 
+@pytest.mark.parametrize(("count", "told"), [(1, "joints joint_0 ("), (2, "joints (")])
+def test_joints_without_limits_are_named(tmp_path, count, told):
+    """Of two joints that turn without end; all of them: the list alone."""
+    text = re.sub(r'type="revolute"', 'type="continuous"', drone(), count=count)
+    made, _ = imported(tmp_path, text)
+    assert f"{told}assumed: the file has no limits)" in made.missing
+
+
 def test_rotors_of_a_coaxial_octocopter_turn_against_each_other(tmp_path):
     made, _ = imported(tmp_path, drone(**VEHICLES["coaxial octo, 5 joints"]))
     above = {}

@@ -144,14 +144,25 @@ def _assumed(values: dict[str, Any], above: str = "") -> Iterator[str]:
             if key not in SMALL:
                 yield from _assumed(value, f"{key}.")
             continue
-        told = [value] if isinstance(value, Told) else [v for one in value for v in one.values()]
-        for one in told:
-            if isinstance(one, Told) and one.origin == ASSUMED:
-                shown = f"{key}: {_text(one.value)}" if isinstance(value, Told) else key
-                if shown not in together.setdefault(str(one), []):
-                    together[str(one)].append(shown)
+        if isinstance(value, Told):
+            if value.origin == ASSUMED:
+                together.setdefault(str(value), []).append(f"{key}: {_text(value.value)}")
+            continue
+        for why, names in _assumed_of(value).items():
+            every = len(names) == len(value)
+            together.setdefault(why, []).append(key if every else f"{key} {', '.join(names)}")
     for why, entries in together.items():
         yield f"{above}{', '.join(entries)} ({why})"
+
+
+def _assumed_of(entries: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Return why → names of the entries of a list of which something was assumed."""
+    found: dict[str, list[str]] = {}
+    for one in entries:
+        told = (v for v in one.values() if isinstance(v, Told) and v.origin == ASSUMED)
+        for why in dict.fromkeys(map(str, told)):
+            found.setdefault(why, []).append(str(one["name"]))
+    return found
 
 
 def usual_name(file: Path) -> str:
