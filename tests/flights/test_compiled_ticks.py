@@ -220,6 +220,7 @@ def test_it_ends_at_the_tick_that_was_asked_for():
     [
         {"faults": ["mocap_dropout@2.5+0.3", "imu_dropout@3.5+0.02"]},
         {"faults": ["mavlink_delay@2.5+1"]},
+        {"faults": ["wind_gust@2.5+1.5"]},  # rises: it acts, but senses nothing
         {"autopilot_imu": True},
         {"profile": "attitude_setpoints"},
         {"effects": presets.laboratory()},

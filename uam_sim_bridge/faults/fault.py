@@ -49,11 +49,12 @@ class PlantCommands:
 class Occurrence:
     """A fault of the plant between its begin and its end.
 
-    noise: generator of this fault, seeded per flight; since [s]: time since the begin; memory: what
-    the fault keeps from tick to tick, None at the begin.
+    noise: generator of this fault, seeded per flight; begun: tick of the begin; since [s]: time
+    since then; memory: what the fault keeps from tick to tick, None at the begin.
     """
 
     noise: np.random.Generator
+    begun: int = 0
     since: float = 0.0
     memory: Any = None
 

@@ -5,7 +5,7 @@ It works with the plant of any physics engine. Flights without plant faults use 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -104,12 +104,11 @@ class FaultyPlant(Plant):
 
     def _begin_and_end(self) -> None:
         """Find the faults that are active at this tick."""
-        for _, now in self._active.values():
-            now.since += self.period
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
-                self._active[one.number] = one.fault, Occurrence(self._noise[one.number])
+                now = Occurrence(self._noise[one.number], self.tick)
+                self._active[one.number] = one.fault, now
             else:
                 del self._active[one.number]
         if self.changed:
@@ -117,6 +116,12 @@ class FaultyPlant(Plant):
                 type(fault).sense is not PlantFault.sense for fault, _ in self._active.values()
             )
             self.acts = self.acts or self._acting  # once more after the end: that undoes it
+
+    def _occurring(self) -> Iterator[tuple[PlantFault, Occurrence]]:
+        """Yield the active faults. Not every tick is sensed here: time is counted in ticks."""
+        for fault, now in self._active.values():
+            now.since = (self.tick - now.begun) * self.period
+            yield fault, now
 
     @property
     def _acting(self) -> bool:
@@ -128,7 +133,7 @@ class FaultyPlant(Plant):
 
     def _changed(self, samples: Samples) -> Samples:
         """Return the samples, changed by the active faults."""
-        for fault, now in self._active.values():
+        for fault, now in self._occurring():
             fault.sense(samples, now)
         return samples
 
@@ -141,7 +146,7 @@ class FaultyPlant(Plant):
             commands = PlantCommands(np.array(motor_commands), np.array(arm_command), bool(magnet))
             described = self.vehicle.description
             change = Disturbance.none(len(described.rotors), len(described.joints))
-            for fault, now in self._active.values():
+            for fault, now in self._occurring():
                 fault.act(commands, change, now)
             if self._physics.DISTURBABLE:
                 self._physics.disturb(change)
