@@ -12,11 +12,11 @@ import math
 from uam_control.maths.compiled import borrowing
 
 # [s], in order of their size
+AHEAD_FOR = 0.02  # of the IMU while poses are further ahead: more than samples in a burst
 AHEAD = 0.05  # a pose may be so far ahead of the IMU, or behind the last one: more is a wrong clock
 STALE = 0.1  # commands, a bias of the IMU: no longer valid; poses: no take-off
 FORWARDED = 0.25  # poses: to the autopilot, and in the comparisons of supervisor and grasp
 HOLD = 0.25  # poses, joint angles, gains of a controller: the vehicle holds, then lands
-AHEAD_FOR = 0.35  # for so long poses wait for an IMU that comes late; more is an error of a clock
 UNAIDED = 0.5  # without a pose for so long an estimate may be far off, in the autopilot, too
 SILENT = 0.5  # reports of the bridge: nobody may follow the mission any more
 LAND = 0.75  # reports of autopilot and bridge: the vehicle lands

@@ -20,9 +20,10 @@ PERIOD = 0.004  # [s]
 def test_the_order_of_the_ages_makes_sense():
     # a pose that the autopilot no longer gets holds the vehicle; while it holds and lands, the
     # estimate uses poses up to the age at which they are missing for everyone: then failsafe
+    assert ages.AHEAD_FOR < ages.AHEAD  # before a pose that is so far ahead would be used
     assert ages.AHEAD < ages.STALE < ages.FORWARDED <= ages.HOLD < ages.UNAIDED < ages.BRIDGED
     assert ages.BRIDGED == ages.FAILSAFE < ages.DISCONNECTED < ages.OTHER_CLOCK
-    assert ages.HOLD < ages.AHEAD_FOR and ages.HOLD < ages.LAND < ages.FAILSAFE
+    assert ages.HOLD < ages.LAND < ages.FAILSAFE
     # the estimate does not follow wrong poses until a failsafe is on the ground (from 3 m)
     blind = ages.FAILSAFE + SupervisionParameters().blind_time
     assert blind + 3.0 / 0.7 < ages.REJECTED <= ages.OTHER_CLOCK

@@ -187,19 +187,28 @@ def test_a_pose_between_two_samples_is_compared_with_the_motion_between_them():
 
 
 @pytest.mark.parametrize("before", [0.0, 0.03])
-def test_poses_of_a_clock_that_is_ahead_for_long_are_refused_until_it_is_right_again(before):
-    """The clock of the poses is set forward by 0.3 s: waiting, they would count 0.3 s late."""
-    found, place = at_rest([0.0]), np.array([0.1, 0.0, 0.0])
+@pytest.mark.parametrize("step", [0.06, 0.3])
+def test_poses_of_a_clock_that_is_ahead_are_refused_until_it_is_right_again(before, step):
+    """The clock of the poses is set forward: waiting, they would count late by its step."""
+    found, place = at_rest([0.0]), np.zeros(3)
     for tick in range(1, 501):
-        now = 0.004 * tick
+        now, place[0] = 0.004 * tick, 0.0 if tick <= 50 else 0.1
+        place[1] = 1e-6 * tick  # no repeat
         found.predict(now, 0.004, NOTHING, WEIGHT)
-        found.correct(now + (before if tick <= 50 else 0.3), place, LEVEL)
-        place[1] += 1e-6  # no repeat
-    assert found.gate.refused > 300 and not found.ahead
-    moved = found.position[0]
+        found.correct(now + (before if tick <= 50 else step), place, LEVEL)
+    assert found.gate.refused > 300 and not found.ahead and found.position[0] == 0.0
     found.predict(2.004, 0.004, NOTHING, WEIGHT)
     found.correct(2.004, place, LEVEL)
-    assert found.position[0] != moved
+    assert found.position[0] > 0.0
+
+
+def test_poses_that_came_while_the_imu_paused_are_used_with_its_samples():
+    found = at_rest([0.0])
+    for stamp in np.arange(0.008, 0.2, 0.008):
+        found.correct(stamp, np.array([0.1, 0.0, 1e-6 * stamp]), LEVEL)
+    for stamp in np.arange(0.004, 0.2, 0.004):
+        found.predict(stamp, 0.004, NOTHING, WEIGHT)
+    assert not found.gate.refused and not found.ahead and found.position[0] > 0.05
 
 
 @pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])

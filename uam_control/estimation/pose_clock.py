@@ -16,7 +16,7 @@ from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import record
 
 # newest [s]: stamp of the newest pose that counted, age [s]: of that at its arrival; ahead_since
-# [s]: stamp of the estimate from which on a pose far ahead waits at any time
+# [s]: stamp of the IMU since which every pose is far ahead
 WHOLE, REAL = "behind ahead", "newest age ahead_since"
 
 
@@ -60,15 +60,16 @@ def counts(clock: np.ndarray, stamp: float, now: float, oldest: float) -> bool:
 
 
 @borrowing
-def waits(clock: np.ndarray, stamp: float, newest: float, waiting: bool) -> bool:
-    """Return whether a pose of `stamp` [s] waits for its IMU sample, newer than `newest` [s].
+def waits(clock: np.ndarray, stamp: float, newest: float) -> bool:
+    """Return whether a pose of `stamp` [s] may wait for its IMU sample; newest [s]: of the IMU.
 
-    waiting: whether others do.
+    An IMU that pauses leaves poses far ahead. They are an error of the clock if samples come in
+    between: before one of them would be used, at an age that it does not have.
     """
     m = clock[0]
     if stamp - newest <= AHEAD:
         m.ahead, m.ahead_since = False, math.inf
-    elif not m.ahead:
-        m.ahead_since = min(m.ahead_since, newest) if waiting else newest
+    else:
+        m.ahead_since = min(m.ahead_since, newest)
         m.ahead = newest - m.ahead_since > AHEAD_FOR
     return not m.ahead

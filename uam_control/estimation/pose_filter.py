@@ -229,9 +229,7 @@ def wait(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.nda
     m, newest = a.numbers[0], newest_stamp(a)
     if not m.count:
         return
-    if stamp > newest and not waits(
-        a.clock, stamp, newest, m.waiting > 0 and a.ahead[m.waiting - 1, 0] > newest
-    ):
+    if not waits(a.clock, stamp, newest):
         while m.waiting and a.ahead[m.waiting - 1, 0] > newest:
             m.waiting -= 1
         a.gate[0].refused += 1
