@@ -266,3 +266,16 @@ def test_a_real_vehicle_without_its_margins_does_not_start(tmp_path, capsys, mon
     monkeypatch.setattr(vehicle, "missed_margins", lambda settings: (line,))
     assert main(["vehicle", "--config", str(lab)]) == 2
     assert line in capsys.readouterr().err
+
+
+def test_margins_that_contradict_each_other_end_the_search(monkeypatch, tmp_path):
+    described = load_description(vehicles.write(QUAD, tmp_path))
+    faults = {True: search.Fault("too fast"), False: search.Fault("too slow", 1.0 / search.STEP)}
+
+    def evaluated(self):
+        fast = self.shares[-1] == 1.0
+        return search.Found(described, None, (), {described.coordinates[-1]: faults[fast]})
+
+    monkeypatch.setattr(search.Search, "evaluated", evaluated)
+    with pytest.raises(DesignError, match=r"keep all margins: .*too slow, or .*too fast"):
+        search.design(described, load_criteria())

@@ -67,6 +67,8 @@ def design(
     Raises DesignError, and VehicleError if the MJCF contradicts the description.
     """
     search = Search(described, criteria)
+    tried: set[tuple[object, str]] = set()
+    before = ""
     for number in range(1, ROUNDS + 1):
         try:
             found = search.evaluated()
@@ -75,6 +77,11 @@ def design(
         progress(f"round {number}: {found.summary}")
         if not found.faults:
             return search.result(found)
+        if (step := (search.shares, found.summary)) in tried:
+            both = f"{before}, or {found.summary}"
+            raise DesignError(f"{described.name}: no gains keep all margins: {both}; --criteria")
+        tried.add(step)
+        before = found.summary
         search.mend(found.faults)
     raise DesignError(f"{described.name}: no gains within {number} rounds: {found.summary}")
 
@@ -112,6 +119,11 @@ class Search:
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
         self._points = self._operating_points()
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Return the share of each loop in what the formulas allow, to ten digits."""
+        return tuple(round(share, 10) for share in self._shares.values())
 
     def _refuse_unbalanced(self) -> None:
         """Raise DesignError where level hover takes all torque that the attitude law may give."""
