@@ -16,8 +16,8 @@ from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import record
 
 # newest [s]: stamp of the newest pose that counted, age [s]: of that at its arrival; ahead_since
-# [s]: stamp of the IMU since which every pose is far ahead
-WHOLE, REAL = "behind ahead", "newest age ahead_since"
+# [s]: stamp of the IMU since which every pose is far ahead, inf: the last one was not
+WHOLE, REAL = "behind", "newest age ahead_since"
 
 
 class PoseClock:
@@ -36,7 +36,7 @@ class PoseClock:
 def forget_clock(clock: np.ndarray) -> None:
     """Know no pose; clock (1,): memory of a `PoseClock`."""
     m = clock[0]
-    m.behind = m.ahead = False
+    m.behind = False
     m.newest = -math.inf
     m.age = m.ahead_since = math.inf
 
@@ -67,9 +67,5 @@ def waits(clock: np.ndarray, stamp: float, newest: float) -> bool:
     between: before one of them would be used, at an age that it does not have.
     """
     m = clock[0]
-    if stamp - newest <= AHEAD:
-        m.ahead, m.ahead_since = False, math.inf
-    else:
-        m.ahead_since = min(m.ahead_since, newest)
-        m.ahead = newest - m.ahead_since > AHEAD_FOR
-    return not m.ahead
+    m.ahead_since = min(m.ahead_since, newest) if stamp - newest > AHEAD else math.inf
+    return newest - m.ahead_since <= AHEAD_FOR

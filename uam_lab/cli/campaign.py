@@ -10,7 +10,15 @@ from pathlib import Path
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, given_profile, place_of
+from uam_lab.cli.command import (
+    Command,
+    Subcommands,
+    chosen_effects,
+    count,
+    given_profile,
+    place_of,
+    repeated_words,
+)
 from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import FlightSettings, SettingsError
@@ -137,7 +145,4 @@ def _again(options: argparse.Namespace) -> str:
     words = ["uam", "campaign", "--flights", str(options.flights), "--seed", str(options.seed)]
     words += ["--vehicle", options.vehicle, "--scenario", options.scenario]
     words += ["--ranges", options.ranges]
-    words += [word for one in options.profile for word in ("--profile", one)]
-    words += [word for one in options.plant_preset for word in ("--plant-preset", one)]
-    words += [word for one in options.effects for word in ("--effect", one)]
-    return shlex.join(words)
+    return shlex.join(words + repeated_words(options))

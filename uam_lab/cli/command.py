@@ -262,6 +262,16 @@ def given_profile(names_or_files: Sequence[str], vehicle: VehicleDescription) ->
     return load_profile(*files, vehicle=vehicle)
 
 
+def repeated_words(options: argparse.Namespace) -> list[str]:
+    """Return the words that give --profile, --plant-preset and --effect again."""
+    given = {
+        "--profile": options.profile,
+        "--plant-preset": options.plant_preset,
+        "--effect": options.effects,
+    }
+    return [word for flag, values in given.items() for one in values for word in (flag, one)]
+
+
 def chosen_effects(options: argparse.Namespace) -> Effects:
     """Return the effects of the plant that --plant-preset and --effect choose.
 

@@ -20,6 +20,7 @@ from uam_lab.cli.command import (
     given_profile,
     place_of,
     refuse_given,
+    repeated_words,
 )
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import CLOCKS, ENGINES, check_clock
@@ -157,13 +158,7 @@ def _again(options: argparse.Namespace, matrix: Matrix) -> str:
         "vehicle": options.vehicle,
     }
     chosen = [f"--{name} {value}" for name, value in named.items() if value is not None]
-    lists = {
-        "profile": options.profile,
-        "plant-preset": options.plant_preset,
-        "effect": options.effects,
-    }
-    several = (f"--{name} {shlex.quote(one)}" for name, values in lists.items() for one in values)
-    return " ".join(["uam fly", *chosen, *several])
+    return " ".join(["uam fly", *chosen, *map(shlex.quote, repeated_words(options))])
 
 
 class _Prepared(NamedTuple):

@@ -113,8 +113,9 @@ class Search:
 
     def __init__(self, described: VehicleDescription, criteria: SimpleNamespace) -> None:
         self._described, self._criteria = described, criteria
-        self.facts = Facts.of(Vehicle.of(described))
-        self._refuse_unbalanced()
+        vehicle = Vehicle.of(described)
+        self.facts = Facts.of(vehicle)
+        self._refuse_unbalanced(vehicle)
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
@@ -125,11 +126,11 @@ class Search:
         """Return the share of each loop in what the formulas allow, to ten digits."""
         return tuple(round(share, 10) for share in self._shares.values())
 
-    def _refuse_unbalanced(self) -> None:
+    def _refuse_unbalanced(self, vehicle: Vehicle) -> None:
         """Raise DesignError where level hover takes all torque that the attitude law may give."""
         allowed = np.array(self._criteria.authority.torque) * self.facts.torque
         for label, arm in self.facts.poses.items():
-            needed = np.abs(standing_torque(Vehicle.of(self._described), arm))
+            needed = np.abs(standing_torque(vehicle, arm))
             for name, one, most in zip(("roll", "pitch"), needed, allowed, strict=False):
                 if one >= most:
                     angles = ", ".join(f"{angle:.0f}" for angle in np.degrees(arm))
@@ -189,10 +190,10 @@ class Search:
         described = replace(self._described, autopilot_gains=gains)
         own = sections(described, self.facts, bandwidths, self._criteria)
         profile = profile_of(own, Path(f"{described.name}_profile.yaml"), described)
-        cases = []
+        vehicle, cases = Vehicle.of(described), []
         for point in list(self._points):
             label, arm, mass = point
-            stack = stack_model(profile, Vehicle.of(described), mass, arm)
+            stack = stack_model(profile, vehicle, mass, arm)
             analysis = analyse(stack)
             cases.append(Case(label, stack, analysis, {}, analysis.mode))
             if faults := self._failing(stack, analysis):
