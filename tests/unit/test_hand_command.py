@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_lab.cli.hand import EXAMPLES
+from uam_lab.cli import hand
 from uam_lab.cli.main import main
 
 PLACE = ("0.15", "0", "-0.25")
@@ -119,7 +119,7 @@ def test_a_picture_that_cannot_be_written(tmp_path, capsys, file, why):
 
 
 def test_the_example_of_the_help_is_within_reach(capsys):
-    assert f"ik --position {' '.join(PLACE)} " in EXAMPLES
+    assert f"ik --position {' '.join(PLACE)} " in hand.__doc__
     assert main(["hand", "ik", "--position", *PLACE]) == 0
 
 

@@ -1,4 +1,15 @@
-"""`uam arm`: are these the described servos, and does their bus carry the control rate?"""
+"""`uam arm`: check the servos of the arm and the budget of their bus.
+
+Compare the Dynamixel servos on the bus with the lab file, and print their state.
+
+examples:
+  uam arm --config my_lab.yaml             the servos of your lab file
+  uam arm --config my_lab.yaml --write-settings       write what differs
+  uam arm --device /dev/ttyUSB1 --scan     ids and models at every baud rate
+  uam arm --budget                         time budget of the bus; no servos needed
+
+Torque stays off. Exit status: 0 as described, 1 not, 2 wrong use or no device.
+"""
 
 from __future__ import annotations
 
@@ -28,27 +39,11 @@ from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.servo_bus import tried
 
 AS_DESCRIBED, OTHERWISE = 0, 1
-EXAMPLES = """\
-examples:
-  uam arm --config my_lab.yaml             the servos of your lab file
-  uam arm --config my_lab.yaml --write-settings       write what differs
-  uam arm --device /dev/ttyUSB1 --scan     ids and models at every baud rate
-  uam arm --budget                         time budget of the bus; no servos needed
-
-Torque stays off. Exit status: 0 as described, 1 not, 2 wrong use or no device.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "arm",
-        run,
-        "check the servos of the arm and the budget of their bus",
-        "Compare the Dynamixel servos on the bus with the lab file, and print their state.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.arm_hardware()
     command.switch("--write-settings", "write operating mode, return delay and current limit")
     command.switch("--scan", "list ids and models at every baud rate, whatever is described")

@@ -1,4 +1,20 @@
-"""`uam budget`: where the time of a control tick goes."""
+"""`uam budget`: where the time of a control tick goes.
+
+Fly with measured ticks: latency from the sensors to the setpoint, and where it goes.
+
+examples:
+  uam budget                               ten minutes in real time, every layout
+  uam budget --minutes 1 --layout fused
+  uam budget --scenario pick_and_place     another flight
+  uam budget --clock lockstep              what the nodes cost where nobody waits for the clock
+  uam budget --fifo 50 --lock-memory       with the options of uam fly for the processes
+  uam budget --cores 2-3 --busy-poll 4     the nodes on cores of their own, without sleeping
+
+It flies to and fro with a moving arm and measures every tick in every node. Results in --out:
+budget.png, summary.md, budget.json, and the folder of each flight. docs/tick_budget.md explains
+them. Nothing else should run on the machine.
+Exit status: 0 measured, 1 a flight was not completed, 2 wrong use.
+"""
 
 from __future__ import annotations
 
@@ -24,32 +40,11 @@ from uam_lab.records.results.terminal import Terminal, say
 
 MEASURED, NOT_COMPLETED = 0, 1
 SCENARIO = "shuttle.yaml"
-EXAMPLES = """\
-examples:
-  uam budget                               ten minutes in real time, every layout
-  uam budget --minutes 1 --layout fused
-  uam budget --scenario pick_and_place     another flight
-  uam budget --clock lockstep              what the nodes cost where nobody waits for the clock
-  uam budget --fifo 50 --lock-memory       with the options of uam fly for the processes
-  uam budget --cores 2-3 --busy-poll 4     the nodes on cores of their own, without sleeping
-
-It flies to and fro with a moving arm and measures every tick in every node. Results in --out:
-budget.png, summary.md, budget.json, and the folder of each flight. docs/tick_budget.md explains
-them. Nothing else should run on the machine.
-Exit status: 0 measured, 1 a flight was not completed, 2 wrong use.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "budget",
-        run,
-        "where the time of a control tick goes",
-        "Fly with measured ticks: latency from the sensors to the setpoint, and where it goes.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     minutes = number("time", "min", 0.5, 600.0)
     command.option("--minutes", "MIN", "length of the flight", 10.0, type=minutes)
     text = "in place of --minutes: a name of config/scenarios or a file"

@@ -1,4 +1,22 @@
-"""`uam calibrate-mocap`: the tracker's axes and the body's pivot, from two places on the floor."""
+"""`uam calibrate-mocap`: axes of the motion capture system and pivot of the vehicle's body.
+
+Measure how a motion capture system's axes and rigid body lie to the world (ENU) and the vehicle
+(FLU), guided, from two places on the floor.
+
+examples:
+  uam calibrate-mocap --config my_lab.yaml --out my_lab_mocap.yaml
+  uam calibrate-mocap --server 192.168.1.5 --body uam        without a lab file
+  uam calibrate-mocap --server 192.168.1.5 --up z            Motive set to Z up
+  uam calibrate-mocap --server 192.168.1.5 --pivot 0.03 0    pivot 3 cm in front of base_link
+  uam calibrate-mocap --server 192.168.1.7 --source motioncapture --system vicon --up z
+  uam calibrate-mocap --server 192.168.1.5 --save raw.csv    keep the measured poses
+  uam calibrate-mocap --log raw.csv                          from recorded poses
+
+The command asks for two places: level on the floor, then again after a straight move nose first.
+It refuses measurements without sense (moved, tilted, turned, too short a way) and writes the file
+that the section `mocap` of the lab file names as its calibration. docs/hardware.md. Exit
+status: 0 written, 2 refused.
+"""
 
 from __future__ import annotations
 
@@ -30,34 +48,11 @@ STEPS = {
     AHEAD: "2. Push it straight ahead, nose first, by 0.5 m or more; 1 m is better.",
 }
 DEFAULTS = MocapParameters()
-EXAMPLES = """\
-examples:
-  uam calibrate-mocap --config my_lab.yaml --out my_lab_mocap.yaml
-  uam calibrate-mocap --server 192.168.1.5 --body uam        without a lab file
-  uam calibrate-mocap --server 192.168.1.5 --up z            Motive set to Z up
-  uam calibrate-mocap --server 192.168.1.5 --pivot 0.03 0    pivot 3 cm in front of base_link
-  uam calibrate-mocap --server 192.168.1.7 --source motioncapture --system vicon --up z
-  uam calibrate-mocap --server 192.168.1.5 --save raw.csv    keep the measured poses
-  uam calibrate-mocap --log raw.csv                          from recorded poses
-
-The command asks for two places: level on the floor, then again after a straight move nose first.
-It refuses measurements without sense (moved, tilted, turned, too short a way) and writes the file
-that the section `mocap` of the lab file names as its calibration. docs/hardware.md. Exit
-status: 0 written, 2 refused.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "calibrate-mocap",
-        run,
-        "axes of the motion capture system and pivot of the vehicle's body",
-        "Measure how a motion capture system's axes and rigid body lie to the world (ENU) and the "
-        "vehicle (FLU), guided, from two places on the floor.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.config()
     for flag, metavar, name, text, how in (
         ("--server", "HOST", "server", "computer of the system", {}),

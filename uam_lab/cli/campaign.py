@@ -1,4 +1,25 @@
-"""`uam campaign`: many random flights around the nominal one."""
+"""`uam campaign`: many random flights: success rate, errors, conditions of the losses.
+
+Fly the mission many times in the direct engine, each with another payload, wind, noise, mass and
+motors.
+
+examples:
+  uam campaign                             1,000 flights of the flying profile
+  uam campaign --flights 100 --profile asmc2
+  uam campaign --flights 100 --vehicle mine.yaml
+  uam campaign --draws 181,389             two of the 1,000 flights
+  uam campaign --draws 181 --replay        one of them again, with report and video
+  uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
+  uam campaign --plant-preset laboratory   with the ranges of that plant
+  uam campaign --out robust                stop with Ctrl-C; the same command continues
+  uam campaign --flights 10000 --scheduler tcp://10.0.0.5:8786    on a cluster of yours
+
+Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
+from the ranges of config/campaign/robustness.yaml, or of the file there that is called as the
+plant's preset; --ranges names another one. Results in --out: report.html,
+summary.md, campaign.json, campaign.png, and every flight in flights.parquet and flights.csv. The
+same seed gives the same flights on any number of workers; more --flights only add some.
+"""
 
 from __future__ import annotations
 
@@ -26,37 +47,11 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 TABLE, USUAL = "flights.parquet", "robustness"
-EXAMPLES = """\
-examples:
-  uam campaign                             1,000 flights of the flying profile
-  uam campaign --flights 100 --profile asmc2
-  uam campaign --flights 100 --vehicle mine.yaml
-  uam campaign --draws 181,389             two of the 1,000 flights
-  uam campaign --draws 181 --replay        one of them again, with report and video
-  uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
-  uam campaign --plant-preset laboratory   with the ranges of that plant
-  uam campaign --out robust                stop with Ctrl-C; the same command continues
-  uam campaign --flights 10000 --scheduler tcp://10.0.0.5:8786    on a cluster of yours
-
-Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
-from the ranges of config/campaign/robustness.yaml, or of the file there that is called as the
-plant's preset; --ranges names another one. Results in --out: report.html,
-summary.md, campaign.json, campaign.png, and every flight in flights.parquet and flights.csv. The
-same seed gives the same flights on any number of workers; more --flights only add some.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "campaign",
-        run,
-        "many random flights: success rate, errors, conditions of the losses",
-        "Fly the mission many times in the direct engine, each with another payload, "
-        "wind, noise, mass and motors.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.option("--flights", "N", "", 1000, type=count)
     command.option("--draws", "I,I,...", "only these flights, counted from 0 (default: all)", "")
     command.switch("--replay", "fly the one flight of --draws as uam fly does: report and video")

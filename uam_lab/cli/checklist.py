@@ -1,21 +1,7 @@
-"""`uam checklist`: the checklist of a real vehicle, live, with keys to confirm and repeat."""
+"""`uam checklist`: the checklist of a real vehicle before a flight.
 
-from __future__ import annotations
+Show the checklist of a running vehicle, live; confirm or repeat its steps.
 
-import argparse
-from typing import TYPE_CHECKING
-
-from uam_lab.cli.command import Command, Subcommands, chosen_flight
-from uam_lab.flights.flight_settings import SettingsError, require_ros
-from uam_lab.records.results.terminal import Terminal, say
-
-if TYPE_CHECKING:
-    from uam_lab.flights.operator import Operator
-
-PASSED, OPEN = 0, 1  # exit status
-SHOW, CONFIRM, REPEAT, LIVE = "show", "confirm", "repeat", "live"
-PERIOD = 0.2  # [s] between two pictures
-EXAMPLES = """\
 examples:
   uam checklist                     live, with keys: c or Enter confirms, r repeats, q ends
   uam checklist show                print it once
@@ -27,17 +13,26 @@ The steps and their limits: docs/preflight.md. Exit status: 0 all items have pas
 was accepted; 1 items are open, or it was refused; 2 no flight or wrong use.
 """
 
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.flights.flight_settings import SettingsError
+from uam_lab.records.results.terminal import Terminal, say
+
+if TYPE_CHECKING:
+    from uam_lab.flights.operator import Operator
+
+PASSED, OPEN = 0, 1  # exit status
+SHOW, CONFIRM, REPEAT, LIVE = "show", "confirm", "repeat", "live"
+PERIOD = 0.2  # [s] between two pictures
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "checklist",
-        run,
-        "the checklist of a real vehicle before a flight",
-        "Show the checklist of a running vehicle, live; confirm or repeat its steps.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     text = "show: print it once; without: live"
     choices = (LIVE, SHOW, CONFIRM, REPEAT)
     command.option("what", None, text, LIVE, nargs="?", choices=choices)
@@ -46,14 +41,9 @@ def add(commands: Subcommands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    require_ros()
-    from uam_lab.flights.operator import NoFlight, Operator
-    from uam_lab.flights.processes.guest import Guest
-    from uam_lab.flights.processes.node_environment import transport_environment
+    with guest_of(options) as guest:
+        from uam_lab.flights.operator import NoFlight, Operator
 
-    domain, namespace = chosen_flight(options)
-    environment = {} if domain is None else transport_environment()
-    with Guest("uam_checklist", environment, domain, namespace) as guest:
         operator = Operator(guest.node)
         try:
             if options.what in (CONFIRM, REPEAT):

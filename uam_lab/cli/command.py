@@ -1,4 +1,4 @@
-"""What the commands share: parser, types of options, errors of the user."""
+"""What the commands share: parser, types of options."""
 
 from __future__ import annotations
 
@@ -7,76 +7,50 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from uam_control.laws import catalogue
-from uam_control.mission import ScenarioError
-from uam_control.profiles.profile import Profile, ProfileError, default_profile, load_profile
+from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
-from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import (
     Bound,
     Choice,
-    ParameterError,
     ParameterSet,
     Switch,
     Text,
 )
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
-from uam_lab.experiments.campaign.variations import VariationError
-from uam_lab.experiments.design.criteria import DesignError
-from uam_lab.experiments.study.description import StudyError
-from uam_lab.experiments.trials.trial import TrialFailed
-from uam_lab.experiments.tuning.space import TuningError
-from uam_lab.experiments.workers.place import WorkersError, Workplace, cores
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription
+from uam_lab.experiments.workers.place import Workplace, cores
 from uam_lab.flights.flight_options import LAST_SEED
-from uam_lab.flights.flight_settings import SettingsError
-from uam_lab.flights.vehicle.lab import LabError
+from uam_lab.flights.flight_settings import SettingsError, require_ros
 from uam_lab.flights.vehicle.lab_file import FOLDER, TEMPLATE
-from uam_lab.records.recording.mcap_reader import UnreadableLog
-from uam_lab.records.results.result_folder import ResultFolderError
-from uam_lab.records.results.row_table import RowTableError
-from uam_lab.records.results.timeseries import UnreadableFlight
 from uam_msgs_py.node.namespace import normal
-from uam_sim_bridge.devices.dynamixel.chain import ArmError
-from uam_sim_bridge.devices.mocap.frame import MocapError
-from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.presets import CALM, Effects
-from uam_sim_bridge.plant.engines import PlantError
-from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
-from uam_sim_bridge.px4.px4_installation import Px4Error
+from uam_sim_bridge.ports import INSTANCES, flight_of
+
+if TYPE_CHECKING:
+    from uam_lab.flights.processes.guest import Guest
 
 Subcommands = argparse._SubParsersAction  # argparse has no other name for it
 WRONG_USE = 2  # exit status
 DEFAULT_SCENARIO = "pick_and_place"
-# the text of each is one line for the user
-USER_ERRORS = (
-    *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
-    *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
-    *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
-    *(ArmError, MocapError, ParameterError, LabError, WorkersError, RowTableError),
-    DesignError,
-)
 
 
 class Command:
     """The parser of a subcommand; its methods add options, with the default in the help."""
 
     def __init__(
-        self,
-        commands: Subcommands,
-        name: str,
-        run: Callable[[argparse.Namespace], int],
-        summary: str,
-        description: str,
-        examples: str,
+        self, commands: Subcommands, page: str, run: Callable[[argparse.Namespace], int]
     ) -> None:
-        """run: called with the parsed options, returns the exit status."""
-        self._name = name
+        """page: the docstring of the command's module: `uam <name>`: summary, description,
+        examples, with an empty line between. run: of the options, returns the exit status."""
+        head, description, examples = page.split("\n\n", 2)
+        title, _, summary = head.removesuffix(".").partition("`: ")
+        self._name = title.split()[-1]
         parser = commands.add_parser(
-            name,
+            self._name,
             help=summary,
             description=description,
             epilog=examples,
@@ -230,6 +204,20 @@ class Command:
         self.option("--instance", "N", text, type=int)
         text = "namespace of its nodes (default: that of the running flight)"
         self.option("--namespace", "NAME", text, "")
+
+
+def guest_of(options: argparse.Namespace) -> Guest:
+    """Return a node in the flight that --instance and --namespace choose, for `with`.
+
+    Raises as `chosen_flight`, RosRefused.
+    """
+    require_ros()
+    from uam_lab.flights.processes.guest import Guest
+    from uam_lab.flights.processes.node_environment import transport_environment
+
+    domain, namespace = chosen_flight(options)
+    environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
+    return Guest(f"uam_{options.command}", environment, domain, namespace)
 
 
 def chosen_flight(options: argparse.Namespace) -> tuple[int | None, str]:

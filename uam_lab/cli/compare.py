@@ -1,4 +1,23 @@
-"""`uam compare`: the paper's tables and figures, all controllers over the same flights."""
+"""`uam compare`: all controllers over the same flights: the paper's tables and figures.
+
+Fly every controller over the same payloads and seeds; write the paper's three tables and five
+figures.
+
+examples:
+  uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
+  uam compare --seeds 10 --jobs 4
+  uam compare --out mine               stop with Ctrl-C; the same command continues
+  uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
+  uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
+  uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
+  uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
+  uam compare --study adaptation       what adaptation buys: docs/adaptation.md
+  uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
+  uam compare --study adaptation --part varied --condition nominal hard --engine ros
+
+Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparison.json, figures/.
+The baselines are reconstructions (docs/law.md). The same command gives the same tables.
+"""
 
 from __future__ import annotations
 
@@ -31,35 +50,11 @@ from uam_lab.records.results.terminal import say
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 SEEDS = 5
-EXAMPLES = """\
-examples:
-  uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
-  uam compare --seeds 10 --jobs 4
-  uam compare --out mine               stop with Ctrl-C; the same command continues
-  uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
-  uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
-  uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
-  uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
-  uam compare --study adaptation       what adaptation buys: docs/adaptation.md
-  uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
-  uam compare --study adaptation --part varied --condition nominal hard --engine ros
-
-Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparison.json, figures/.
-The baselines are reconstructions (docs/law.md). The same command gives the same tables.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "compare",
-        run,
-        "all controllers over the same flights: the paper's tables and figures",
-        "Fly every controller over the same payloads and seeds; write the paper's "
-        "three tables and five figures.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.vehicle("the study's")
     command.scenario("the study's")
     command.option("--seeds", "N", "seeds 1..N (default 5; with --study the study's)", type=count)

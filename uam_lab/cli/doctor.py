@@ -1,4 +1,16 @@
-"""`uam doctor`: check the requirements of a flight on this machine."""
+"""`uam doctor`: check installation, ports, rendering and autopilot link, with advice.
+
+Check installation, ROS, ports, rendering, autopilot link and machine. With --autopilot, compare a
+PX4's parameters with those that a vehicle needs (config/px4/vehicle.yaml).
+
+examples:
+  uam doctor                                    takes half a minute
+  uam doctor --autopilot serial:/dev/ttyACM0:921600
+  uam doctor --config my_lab.yaml               the devices of a lab file, too; no torque
+  uam doctor --json > doctor.json               for a bug report
+
+Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
+"""
 
 from __future__ import annotations
 
@@ -16,28 +28,11 @@ from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
 
 FINE, BROKEN = 0, 1
 STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
-EXAMPLES = """\
-examples:
-  uam doctor                                    takes half a minute
-  uam doctor --autopilot serial:/dev/ttyACM0:921600
-  uam doctor --config my_lab.yaml               the devices of a lab file, too; no torque
-  uam doctor --json > doctor.json               for a bug report
-
-Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "doctor",
-        run,
-        "check installation, ports, rendering and autopilot link, with advice",
-        "Check installation, ROS, ports, rendering, autopilot link and machine. With --autopilot,\n"
-        "compare a PX4's parameters with those that a vehicle needs (config/px4/vehicle.yaml).",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.config()
     text = f"check an autopilot there: {ALLOWED} (default: the lab file's)"
     command.option("--autopilot", "URL", text, "")

@@ -1,4 +1,16 @@
-"""`uam duel`: laws over the tasks of another laboratory, beside its published figures."""
+"""`uam duel`: laws over another laboratory's tasks, beside its published figures.
+
+Fly every row of a duel over its tasks on its plant; write the errors of end effector, platform and
+heading beside the published ones, standing offset and survived delay.
+
+examples:
+  uam duel                              every row, three seeds: some 400 flights
+  uam duel --seeds 1 --rows "default, hand"
+  uam duel pillars                      pick-and-place, 20 seeds
+  uam duel mine.yaml --out mine         a file as config/duel/fsc_lab.yaml; a stopped duel continues
+
+Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
+"""
 
 from __future__ import annotations
 
@@ -10,28 +22,10 @@ from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
-EXAMPLES = """\
-examples:
-  uam duel                              every row, three seeds: some 400 flights
-  uam duel --seeds 1 --rows "default, hand"
-  uam duel pillars                      pick-and-place, 20 seeds
-  uam duel mine.yaml --out mine         a file as config/duel/fsc_lab.yaml; a stopped duel continues
-
-Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
-"""
-
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "duel",
-        run,
-        "laws over another laboratory's tasks, beside its published figures",
-        "Fly every row of a duel over its tasks on its plant; write the errors of end effector, "
-        "platform and heading beside the published ones, standing offset and survived delay.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     text = "a duel of config/duel, or a file"
     command.option("name", "NAME|FILE", text, "fsc_lab", nargs="?")
     command.option("--seeds", "N", "seeds 1..N (default: the duel's)", type=count)

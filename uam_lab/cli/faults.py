@@ -1,4 +1,23 @@
-"""`uam faults`: fly every fault at every moment of the mission and classify the outcome."""
+"""`uam faults`: faults at every moment of the mission, with their outcomes.
+
+Fly the mission once for each fault and moment, and classify the outcome.
+
+examples:
+  uam faults                                 the matrix of config/campaign/faults.yaml
+  uam faults --list                          list all faults, with parameters and ranges
+  uam faults --only motor_loss --moment transit
+  uam faults --matrix mine.yaml --profile asmc2
+  uam faults --only motor_loss --vehicle mine.yaml
+  uam faults --matrix processes --engine ros --clock realtime --repeat 3
+  uam faults --matrix cables --engine rehearsal --config my_lab.yaml
+  uam faults --matrix random --draws 100 --seed 3      100 random flights: one fault, or two
+  uam faults --out matrix                    stop with Ctrl-C; the same command continues
+  uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
+
+Results in --out: report.html with the matrix in colours, summary.md, faults.json, matrix.png, every
+flight in flights.parquet and flights.csv. The same seed gives the same flights, except with process
+faults. Exit status: 0 all promises of the matrix kept, 1 a promise broken, 2 wrong use.
+"""
 
 from __future__ import annotations
 
@@ -37,35 +56,11 @@ if TYPE_CHECKING:
     from uam_lab.experiments.faults.trial import FaultResult
 
 BROKEN = 1
-EXAMPLES = """\
-examples:
-  uam faults                                 the matrix of config/campaign/faults.yaml
-  uam faults --list                          list all faults, with parameters and ranges
-  uam faults --only motor_loss --moment transit
-  uam faults --matrix mine.yaml --profile asmc2
-  uam faults --only motor_loss --vehicle mine.yaml
-  uam faults --matrix processes --engine ros --clock realtime --repeat 3
-  uam faults --matrix cables --engine rehearsal --config my_lab.yaml
-  uam faults --matrix random --draws 100 --seed 3      100 random flights: one fault, or two
-  uam faults --out matrix                    stop with Ctrl-C; the same command continues
-  uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
-
-Results in --out: report.html with the matrix in colours, summary.md, faults.json, matrix.png, every
-flight in flights.parquet and flights.csv. The same seed gives the same flights, except with process
-faults. Exit status: 0 all promises of the matrix kept, 1 a promise broken, 2 wrong use.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "faults",
-        run,
-        "faults at every moment of the mission, with their outcomes",
-        "Fly the mission once for each fault and moment, and classify the outcome.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.switch("--list", "list the faults; do not fly")
     text = "faults and moments, as config/campaign/faults.yaml"
     command.option("--matrix", "NAME|FILE", text, "faults")

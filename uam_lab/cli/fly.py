@@ -1,29 +1,7 @@
-"""`uam fly`: fly a scenario and write a result folder."""
+"""`uam fly`: fly a scenario and write a result folder.
 
-from __future__ import annotations
+Start every node, fly a scenario, write a result folder.
 
-import argparse
-import contextlib
-from collections.abc import Iterable
-from dataclasses import replace
-
-from uam_control.laws import catalogue
-from uam_control.settings import configuration
-from uam_lab.cli.command import Command, Subcommands, chosen_process, number
-from uam_lab.flights import flight_settings
-from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_options import FlightOptions
-from uam_lab.flights.flight_settings import FlightSettings
-from uam_lab.flights.library.flight import Engine, Flight
-from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
-from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
-from uam_lab.flights.progress import Progress
-from uam_lab.records.results.terminal import Terminal, say
-from uam_lab.report.page.console import reporting, summary
-from uam_sim_bridge.faults.schedule import late
-
-COMPLETED, NOT_COMPLETED = 0, 1
-EXAMPLES = """\
 examples:
   uam fly                                    the paper's mission, default profile
   uam fly --scenario hover --seed 7          another scenario, other noise
@@ -56,17 +34,34 @@ alpha_1,alpha_2 (SI, ENU). A scenario that exceeds a limit of the vehicle is ref
 Exit status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use.
 """
 
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterable
+from dataclasses import replace
+
+from uam_control.laws import catalogue
+from uam_control.settings import configuration
+from uam_lab.cli.command import Command, Subcommands, chosen_process, number
+from uam_lab.flights import flight_settings
+from uam_lab.flights.conclude import command_line
+from uam_lab.flights.flight_options import FlightOptions
+from uam_lab.flights.flight_settings import FlightSettings
+from uam_lab.flights.library.flight import Engine, Flight
+from uam_lab.flights.library.flight_result import FlightFailed, FlightResult
+from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
+from uam_lab.flights.progress import Progress
+from uam_lab.records.results.terminal import Terminal, say
+from uam_lab.report.page.console import reporting, summary
+from uam_sim_bridge.faults.schedule import late
+
+COMPLETED, NOT_COMPLETED = 0, 1
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "fly",
-        run,
-        "fly a scenario and write a result folder",
-        "Start every node, fly a scenario, write a result folder.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     option = command.option
     text = "; ".join(f"{name}: {law.label}" for name, law in catalogue.LAWS.items())
     option("--controller", "NAME", text, catalogue.DEFAULT)
@@ -161,7 +156,7 @@ def fly(
     engine: Engine | None = None,
     name: str = "fly",
 ) -> int:
-    """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts.
+    """Fly and report; return the exit status. Raises one-line errors before the flight starts.
 
     engine: None for that of the settings; name: of the command.
     """

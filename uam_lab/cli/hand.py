@@ -1,4 +1,18 @@
-"""`uam hand`: where the end effector of a vehicle is, and can be."""
+"""`uam hand`: where the end effector is, and can be.
+
+Compute forward and inverse kinematics and the workspace of a vehicle's end effector.
+
+examples:
+  uam hand fk --joints 0.5,1.0                             forward kinematics, angles in radians
+  uam hand fk --joints=-45,-45 --degrees --json            in degrees; for a program
+  uam hand ik --position 0.15 0 -0.25                      angles for a place in the base frame [m]
+  uam hand workspace --out reach.png                       where it can be, as a picture
+
+The base is level; an end effector on a passive hinge hangs. position_m and orientation_wxyz: of
+the end effector; centre_of_mass_m: of the whole vehicle without payload. All from the origin of the
+base frame, FLU (x forward, y left, z up). fk computes angles beyond a joint's range, too, and tells
+it; ik stays within. Exit status 1: ik: the arm does not reach the place; the nearest is printed.
+"""
 
 from __future__ import annotations
 
@@ -29,30 +43,11 @@ OF = {
     "position": ("ik", True),
     "out": ("workspace", False),
 }
-EXAMPLES = """\
-examples:
-  uam hand fk --joints 0.5,1.0                             forward kinematics, angles in radians
-  uam hand fk --joints=-45,-45 --degrees --json            in degrees; for a program
-  uam hand ik --position 0.15 0 -0.25                      angles for a place in the base frame [m]
-  uam hand workspace --out reach.png                       where it can be, as a picture
-
-The base is level; an end effector on a passive hinge hangs. position_m and orientation_wxyz: of
-the end effector; centre_of_mass_m: of the whole vehicle without payload. All from the origin of the
-base frame, FLU (x forward, y left, z up). fk computes angles beyond a joint's range, too, and tells
-it; ik stays within. Exit status 1: ik: the arm does not reach the place; the nearest is printed.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "hand",
-        run,
-        "where the end effector is, and can be",
-        "Compute forward and inverse kinematics and the workspace of a vehicle's end effector.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     choices = tuple(ACTIONS)
     command.option("action", None, f"one of {', '.join(choices)}", choices=choices)
     command.vehicle()

@@ -1,4 +1,17 @@
-"""`uam identify-joint`: torque constant and friction of one joint, from a motion of it."""
+"""`uam identify-joint`: identify torque constant and friction of one joint.
+
+Move one joint of the arm, the others held, and fit torque constant, Coulomb and viscous friction.
+
+examples:
+  uam identify-joint alpha_2 --config my_lab.yaml --load 0.2
+  uam identify-joint alpha_1 --config my_lab.yaml --centre 30 --amplitude 30
+  uam identify-joint alpha_2 --duration 40 --yes      without the question
+
+Propellers off, vehicle level and fixed, hands away: the joint moves. A load at the magnet makes
+the torque constant visible (its weight is the reference). Results in --out: identification.yaml
+(to paste into the lab file), friction.png, samples.csv. Ctrl-C ends it with torque off.
+Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no device.
+"""
 
 from __future__ import annotations
 
@@ -22,30 +35,11 @@ from uam_sim_bridge.devices.dynamixel.friction_fit import FrictionFit
 DONE, NOT_DONE = 0, 1
 GRID = 181  # angles at which the weight is computed
 CLOCK = time.monotonic  # [s]
-EXAMPLES = """\
-examples:
-  uam identify-joint alpha_2 --config my_lab.yaml --load 0.2
-  uam identify-joint alpha_1 --config my_lab.yaml --centre 30 --amplitude 30
-  uam identify-joint alpha_2 --duration 40 --yes      without the question
-
-Propellers off, vehicle level and fixed, hands away: the joint moves. A load at the magnet makes
-the torque constant visible (its weight is the reference). Results in --out: identification.yaml
-(to paste into the lab file), friction.png, samples.csv. Ctrl-C ends it with torque off.
-Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no device.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "identify-joint",
-        run,
-        "identify torque constant and friction of one joint",
-        "Move one joint of the arm, the others held, and fit torque constant, Coulomb and viscous "
-        "friction.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.option("joint", "JOINT", "name of the joint, as alpha_2")
     command.arm_hardware()
     specs, default = ExcitationParameters.specs(), ExcitationParameters()

@@ -1,4 +1,19 @@
-"""`uam margins`: delay, gain and phase margin and bandwidth of every loop."""
+"""`uam margins`: delay, gain and phase margin and bandwidth of every loop.
+
+Linearise the objects that fly around hover and compute the margins of each loop: attitude,
+position, joints.
+
+examples:
+  uam margins                              default profile: without payload and with 0.2 kg
+  uam margins --profile s500 --profile mine.yaml      mine.yaml overrides
+  uam margins --payload 0 --payload 0.4    other payloads
+  uam margins --delay 16                   with setpoints that come 16 ms later
+  uam margins --flight results/latest      adapted gains of a flight (default: one is flown)
+  uam margins --initial                    only the initial gains; no flight
+
+The model is linear, around hover; docs/tuning.md. Results in --out: margins.md, margins.json,
+bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong use.
+"""
 
 from __future__ import annotations
 
@@ -16,31 +31,11 @@ from uam_lab.records.results.terminal import say
 
 STABLE, UNSTABLE = 0, 1
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
-EXAMPLES = """\
-examples:
-  uam margins                              default profile: without payload and with 0.2 kg
-  uam margins --profile s500 --profile mine.yaml      mine.yaml overrides
-  uam margins --payload 0 --payload 0.4    other payloads
-  uam margins --delay 16                   with setpoints that come 16 ms later
-  uam margins --flight results/latest      adapted gains of a flight (default: one is flown)
-  uam margins --initial                    only the initial gains; no flight
-
-The model is linear, around hover; docs/tuning.md. Results in --out: margins.md, margins.json,
-bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong use.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "margins",
-        run,
-        "delay, gain and phase margin and bandwidth of every loop",
-        "Linearise the objects that fly around hover and compute the margins of each loop: "
-        "attitude, position, joints.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.profile()
     command.vehicle()
     command.scenario()

@@ -5,13 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
 from uam_control.settings.texts import visible
-from uam_lab.cli.command import Command, Subcommands, chosen_flight, number
-from uam_lab.flights.flight_settings import SettingsError, require_ros
+from uam_lab.cli.command import Command, Subcommands, guest_of, number
 from uam_lab.records.results.terminal import say
 
 if TYPE_CHECKING:
@@ -28,12 +25,36 @@ WHAT = {
     ),
     "land": ("land here", "Descend vertically and disarm."),
     "disarm": ("motors off", "Motors off: on the ground, or in failsafe."),
+    "kill": (
+        "stop the motors at once, in the air too",
+        "Stop the motors at once: a vehicle in the air falls. Asks first.",
+    ),
+    "goto": (
+        "fly to a position",
+        "Fly to a position [m, ENU] and hold it there: the base, or the hand (end effector).",
+    ),
+    "status": ("phase, errors, who has control", "Show the flight."),
+    "preflight": (
+        "the pre-arm report",
+        "Show every check before arming with value and limit. Exit status 1 if one fails.",
+    ),
 }
-ELSEWHERE = """\
-  uam {name}                            the flight that runs
-  uam {name} --instance 2               one of several flights
-  uam {name} --namespace uav1           the same, by the namespace of its nodes
-  ROS_DOMAIN_ID=5 uam {name} --namespace uav1   nodes that uam fly did not start
+PLACES = """\
+  uam goto 0.5 0 1.2 --yaw 90         turn north; without --yaw the heading stays
+  uam goto 0.5 0 0                    keep the height
+  uam goto --hand 0.5 0 0.8           bring the hand there, base and arm together
+"""
+PAGE = """\
+`uam {0}`: {1}.
+
+{2}
+
+examples:
+{3}\
+  uam {4}                            the flight that runs
+  uam {4} --instance 2               one of several flights
+  uam {4} --namespace uav1           the same, by the namespace of its nodes
+  ROS_DOMAIN_ID=5 uam {4} --namespace uav1   nodes that uam fly did not start
 
 Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong use.
 """
@@ -41,76 +62,30 @@ Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong
 
 def add(commands: Subcommands) -> None:
     """Add the subcommands to the command line."""
-    for name, (summary, description) in WHAT.items():
-        _command(commands, name, partial(_send, name), summary, description)
-    kill = _command(
-        commands,
-        "kill",
-        _kill,
-        "stop the motors at once, in the air too",
-        "Stop the motors at once: a vehicle in the air falls. Asks first.",
-    )
-    kill.switch("--yes", "do not ask")
-    goto = _command(
-        commands,
-        "goto",
-        _goto,
-        "fly to a position",
-        "Fly to a position [m, ENU] and hold it there: the base, or the hand (end effector).",
-        "  uam goto 0.5 0 1.2 --yaw 90         turn north; without --yaw the heading stays\n"
-        "  uam goto 0.5 0 0                    keep the height\n"
-        "  uam goto --hand 0.5 0 0.8           bring the hand there, base and arm together\n",
-        " 0.5 0 1.2",
-    )
+    made = {}
+    for name, texts in WHAT.items():
+        examples = (PLACES, "goto 0.5 0 1.2") if name == "goto" else ("", name)
+        made[name] = Command(commands, PAGE.format(name, *texts, *examples), _run)
+        made[name].instance()
+    made["kill"].switch("--yes", "do not ask")
+    goto = made["goto"]
     for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is, of the base")):
         goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
     text = "heading (default: as it is)"
     goto.option("--yaw", "DEGREES", text, type=number("heading", "degrees"))
     goto.switch("--hand", "position and heading of the end effector")
-    _command(commands, "status", _status, "phase, errors, who has control", "Show the flight.")
-    _command(
-        commands,
-        "preflight",
-        _preflight,
-        "the pre-arm report",
-        "Show every check before arming with value and limit. Exit status 1 if one fails.",
-    )
 
 
-def _command(
-    commands: Subcommands,
-    name: str,
-    act: Callable[[Operator, argparse.Namespace], int],
-    summary: str,
-    description: str,
-    examples: str = "",
-    arguments: str = "",
-) -> Command:
-    """Add a command; arguments: those that it needs, for its examples, behind a space."""
-    text = f"examples:\n{examples}{ELSEWHERE.format(name=name + arguments)}"
-    command = Command(commands, name, partial(_run, act), summary, description, text)
-    command.instance()
-    return command
-
-
-def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> int:
     """Run a command on the flight; return the exit status."""
-    require_ros()
-    from uam_lab.flights.operator import NoFlight, Operator
-    from uam_lab.flights.processes.guest import Guest
-    from uam_lab.flights.processes.node_environment import transport_environment
+    with guest_of(options) as guest:
+        from uam_lab.flights.operator import Operator
 
-    domain, namespace = chosen_flight(options)
-    environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
-    with Guest(f"uam_{options.command}", environment, domain, namespace) as guest:
-        try:
-            return act(Operator(guest.node), options)
-        except NoFlight as error:
-            raise SettingsError(str(error)) from None
+        return ACTS.get(options.command, _send)(Operator(guest.node), options)
 
 
-def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:
-    return _said(name, *operator.command(name))
+def _send(operator: Operator, options: argparse.Namespace) -> int:
+    return _said(options.command, *operator.command(options.command))
 
 
 def _kill(operator: Operator, options: argparse.Namespace) -> int:
@@ -177,3 +152,6 @@ def _preflight(operator: Operator, _: argparse.Namespace) -> int:
 def _said(name: str, accepted: bool, text: str) -> int:
     say(f"{name}: {visible(text)}", error=not accepted)
     return DONE if accepted else REFUSED
+
+
+ACTS = {"kill": _kill, "goto": _goto, "status": _status, "preflight": _preflight}

@@ -11,11 +11,12 @@ from pathlib import Path
 
 from uam_control.settings.texts import visible
 from uam_lab.cli import output
-from uam_lab.cli.command import USER_ERRORS, WRONG_USE
+from uam_lab.cli.command import WRONG_USE
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.terminal import say
 
 NOT_WRITTEN = 1  # exit status
+OURS = "uam_"  # packages whose errors have a text of one line for the user
 LONGEST_ERROR = 2000  # [characters]
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -113,7 +114,9 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         say(f"uam {options.command}: interrupted", error=True)
         return INTERRUPTED
-    except (*USER_ERRORS, OSError) as error:
+    except Exception as error:
+        if not (isinstance(error, OSError) or type(error).__module__.startswith(OURS)):
+            raise
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
             return NOT_WRITTEN

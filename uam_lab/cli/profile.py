@@ -1,18 +1,7 @@
-"""`uam profile`: switch the profile of a running flight."""
+"""`uam profile`: switch the profile of a running flight.
 
-from __future__ import annotations
+Switch the profile of a running flight: all nodes apply it, or none.
 
-import argparse
-from typing import Any
-
-from uam_control.profiles.profile import Profile, load_profile
-from uam_control.settings import configuration
-from uam_lab.cli.command import Command, Subcommands, chosen_flight
-from uam_lab.flights.flight_settings import SettingsError, require_ros
-from uam_lab.records.results.terminal import say
-
-CHANGED, REFUSED = 0, 1
-EXAMPLES = """\
 examples:
   uam profile mine.yaml                    the running flight; all nodes accept it, or none
   uam profile s500 --instance 2            one of several flights
@@ -23,17 +12,22 @@ Adapted gains, filters and the desired attitude stay unchanged; the outputs chan
 gains act on the same errors (docs/tuning.md). The log records every change.
 """
 
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from uam_control.profiles.profile import load_profile
+from uam_control.settings import configuration
+from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.records.results.terminal import say
+
+CHANGED, REFUSED = 0, 1
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "profile",
-        run,
-        "switch the profile of a running flight",
-        "Switch the profile of a running flight: all nodes apply it, or none.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     text = f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file"
     command.option("profile", "NAME|FILE", text, nargs="+")
     command.instance()
@@ -41,32 +35,17 @@ def add(commands: Subcommands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    require_ros()
     given = [str(configuration.named("profiles", one)) for one in options.profile]
-    domain, namespace = chosen_flight(options)
-    return switch(load_profile(*given, namespace=namespace), domain, namespace)
+    with guest_of(options) as guest:
+        from uam_lab.flights.ros.profile_switch import (
+            ProfileSwitch,
+            SwitchIncomplete,
+            SwitchRefused,
+        )
 
-
-def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
-    """Switch the nodes of a vehicle, print the changes; return the exit status.
-
-    Raises SettingsError if none of them is there.
-    """
-    from uam_lab.flights.operator import NoFlight
-    from uam_lab.flights.processes.guest import Guest
-    from uam_lab.flights.processes.node_environment import transport_environment
-    from uam_lab.flights.ros.profile_switch import (
-        ProfileSwitch,
-        SwitchIncomplete,
-        SwitchRefused,
-    )
-
-    environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
-    with Guest("uam_profile", environment, domain, namespace) as guest:
+        profile = load_profile(*given, namespace=guest.node.get_namespace())
         try:
             changed = ProfileSwitch(guest.node).switch(profile)
-        except NoFlight as error:
-            raise SettingsError(str(error)) from None
         except SwitchRefused as refusal:
             whole = not isinstance(refusal, SwitchIncomplete)
             state = "nothing changed" if whole else "but not all nodes have their old values"

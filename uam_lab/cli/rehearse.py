@@ -1,4 +1,20 @@
-"""`uam rehearse`: fly a lab file with the vehicle's nodes on emulated devices."""
+"""`uam rehearse`: fly a lab file on emulated devices.
+
+Fly a lab file with the vehicle's nodes: serial lines, sockets and GPIO are emulated.
+
+examples:
+  uam rehearse --config my_lab.yaml                  as uam vehicle, on emulated devices
+  uam rehearse --scenario pick_and_place             the template's laboratory
+  uam rehearse --cable bus_unplugged@carry+2         pull the arm's adapter, 2 s into the carry
+  uam rehearse --cable serial_bit_errors@start --no-report
+  uam rehearse --px4-dir ~/PX4-Autopilot/build/px4_sitl_nolockstep     a real PX4 in HITL
+  uam rehearse --cable joints_swapped@start          a mistake of the wiring: the start is refused
+  uam faults --list                                  all faults; those of cables at the end
+
+The same nodes, drivers and lab file as uam vehicle; only the names of the devices are replaced
+(lab.yaml in the result folder). Faults: docs/preflight.md.
+Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
+"""
 
 from __future__ import annotations
 
@@ -20,32 +36,10 @@ from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
 
-EXAMPLES = """\
-examples:
-  uam rehearse --config my_lab.yaml                  as uam vehicle, on emulated devices
-  uam rehearse --scenario pick_and_place             the template's laboratory
-  uam rehearse --cable bus_unplugged@carry+2         pull the arm's adapter, 2 s into the carry
-  uam rehearse --cable serial_bit_errors@start --no-report
-  uam rehearse --px4-dir ~/PX4-Autopilot/build/px4_sitl_nolockstep     a real PX4 in HITL
-  uam rehearse --cable joints_swapped@start          a mistake of the wiring: the start is refused
-  uam faults --list                                  all faults; those of cables at the end
-
-The same nodes, drivers and lab file as uam vehicle; only the names of the devices are replaced
-(lab.yaml in the result folder). Faults: docs/preflight.md.
-Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
-"""
-
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "rehearse",
-        run,
-        "fly a lab file on emulated devices",
-        "Fly a lab file with the vehicle's nodes: serial lines, sockets and GPIO are emulated.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.config(TEMPLATE)
     command.option("--scenario", "NAME|FILE", "in place of the lab file's")
     command.repeated(

@@ -1,4 +1,15 @@
-"""`uam report`: rebuild the report of a recorded flight, or overlay several flights."""
+"""`uam report`: rebuild figures and report from the log alone; overlay several flights.
+
+Rebuild table, metrics, figures and report of a flight from its log.mcap, or draw several flights in
+the same figures.
+
+examples:
+  uam report results/latest                rebuild everything from its log.mcap, also after a flight
+                                           that was killed
+  uam report results/latest --ulog a.ulg   with the log of PX4 beside ours
+  uam report results/latest --out again    write to another folder
+  uam report results/a results/b           both flights in the same figures
+"""
 
 from __future__ import annotations
 
@@ -13,27 +24,11 @@ from uam_lab.records.results.terminal import Terminal, say
 WRITTEN = 0
 # of metrics.json, without which there is no summary
 SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
-EXAMPLES = """\
-examples:
-  uam report results/latest                rebuild everything from its log.mcap, also after a flight
-                                           that was killed
-  uam report results/latest --ulog a.ulg   with the log of PX4 beside ours
-  uam report results/latest --out again    write to another folder
-  uam report results/a results/b           both flights in the same figures
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "report",
-        run,
-        "rebuild figures and report from the log alone; overlay several flights",
-        "Rebuild table, metrics, figures and report of a flight from its log.mcap, or "
-        "draw several flights in the same figures.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.option("directories", "DIR", "result folder of a flight", nargs="+", type=Path)
     text = "result folder (default: the given one; for several flights results/<time>-report)"
     command.option("--out", "DIR", text, type=Path)

@@ -1,18 +1,7 @@
-"""`uam teleop`: the hand by the keys of a terminal, without a gamepad."""
+"""`uam teleop`: move the hand by keys.
 
-from __future__ import annotations
+Move the end effector by keys, switch its gripper, hold. Needs a terminal.
 
-import argparse
-import time
-
-from uam_control.stages.gamepad import DEFAULT, Keys, Mapping, MappingError
-from uam_lab.cli import keys
-from uam_lab.cli.command import Command, Subcommands, chosen_flight
-from uam_lab.flights.flight_settings import SettingsError, require_ros
-from uam_lab.records.results.terminal import say
-
-END = "x"
-EXAMPLES = """\
 examples:
   uam teleop                          keys of config/teleop/gamepad.yaml: w a s d, r f, q e, ...
   uam teleop --mapping my_keys.yaml   keys of your own
@@ -21,17 +10,23 @@ examples:
 A key moves the hand while it is held; without one the hand stops. x or Ctrl-C ends.
 """
 
+from __future__ import annotations
+
+import argparse
+import time
+
+from uam_control.stages.gamepad import DEFAULT, Keys, Mapping
+from uam_lab.cli import keys
+from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.flights.flight_settings import SettingsError
+from uam_lab.records.results.terminal import say
+
+END = "x"
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "teleop",
-        run,
-        "move the hand by keys",
-        "Move the end effector by keys, switch its gripper, hold. Needs a terminal.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.instance()
     text = "name of a file in config/teleop, or a file"
     command.option("--mapping", "NAME|FILE", text, DEFAULT)
@@ -39,11 +34,7 @@ def add(commands: Subcommands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Send keys until the end; return the exit status."""
-    require_ros()
-    try:
-        mapping = Mapping.read(options.mapping)
-    except MappingError as error:
-        raise SettingsError(str(error)) from None
+    mapping = Mapping.read(options.mapping)
     with keys.Keys() as pressed:
         if not pressed.available:
             raise SettingsError("teleop needs a terminal; a gamepad: ros2 run uam_control teleop")
@@ -52,14 +43,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace, mapping: Mapping, pressed: keys.Keys) -> None:
-    from uam_control.nodes.teleop import Teleop
-    from uam_lab.flights.operator import Operator
-    from uam_lab.flights.processes.guest import Guest
-    from uam_lab.flights.processes.node_environment import transport_environment
+    with guest_of(options) as guest:
+        from uam_control.nodes.teleop import Teleop
+        from uam_lab.flights.operator import Operator
 
-    domain, namespace = chosen_flight(options)
-    environment = {} if domain is None else transport_environment()
-    with Guest("uam_teleop", environment, domain, namespace) as guest:
         operator, pad = Operator(guest.node), Keys(mapping)
         teleop, answered = Teleop(guest.node, mapping, say), operator.mission().answers
         limits = ""

@@ -1,4 +1,23 @@
-"""`uam tune`: searches a controller's parameters over whole flights."""
+"""`uam tune`: search a controller's parameters over whole flights.
+
+Search a controller's parameters over whole flights of the direct engine, with several payloads and
+seeds: for the least cost, or for least cost and largest delay margin.
+
+examples:
+  uam tune                                   the modular law, 200 evaluations
+  uam tune --controller asmc1 --evaluations 100
+  uam tune --out results/tune-mine           continue a stopped search
+  uam tune --space mine.yaml --profile best.yaml
+  uam tune --controller late_links --evaluations 300     cost and delay margin, with their front
+  uam tune --evaluations 2000 --patience 300     until 300 evaluations improve it by less than 1 %
+  uam tune --vehicle mine.yaml
+  uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
+                                             the same command on each
+
+A space (config/tuning) defines the parameters with their ranges, the flights of an evaluation, and
+the cost. Results in --out: best.yaml (for uam fly --profile), search.png, evaluations.csv,
+study.journal.
+"""
 
 from __future__ import annotations
 
@@ -20,35 +39,10 @@ from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
-EXAMPLES = """\
-examples:
-  uam tune                                   the modular law, 200 evaluations
-  uam tune --controller asmc1 --evaluations 100
-  uam tune --out results/tune-mine           continue a stopped search
-  uam tune --space mine.yaml --profile best.yaml
-  uam tune --controller late_links --evaluations 300     cost and delay margin, with their front
-  uam tune --evaluations 2000 --patience 300     until 300 evaluations improve it by less than 1 %
-  uam tune --vehicle mine.yaml
-  uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
-                                             the same command on each
-
-A space (config/tuning) defines the parameters with their ranges, the flights of an evaluation, and
-the cost. Results in --out: best.yaml (for uam fly --profile), search.png, evaluations.csv,
-study.journal.
-"""
-
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "tune",
-        run,
-        "search a controller's parameters over whole flights",
-        "Search a controller's parameters over whole flights of the direct engine, with several "
-        "payloads and seeds: for the least cost, or for least cost and largest delay margin.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     text = f"space of config/tuning: {', '.join(configuration.names('tuning'))}"
     command.option("--controller", "NAME", text, catalogue.DEFAULT)
     command.option("--space", "FILE", "file with another space")

@@ -1,4 +1,21 @@
-"""`uam vehicle`: bring a real vehicle up and fly it; no simulator."""
+"""`uam vehicle`: bring a real vehicle up and fly it.
+
+Start the drivers and the nodes of a real vehicle, as its lab file describes it.
+
+examples:
+  uam vehicle --example > my_lab.yaml        the template of a lab file, with comments
+  uam vehicle --config my_lab.yaml           drivers, estimator, mission, controllers, bridge ...
+  uam vehicle --config my_lab.yaml --dry-run        all commands computed, none sent, nothing armed
+  uam vehicle import drone.urdf              the files of a vehicle of yours: uam vehicle import -h
+  uam vehicle --config my_lab.yaml --systemd | sudo tee /etc/systemd/system/uam-vehicle.service
+  uam vehicle design my/quad.yaml            gains and profile of a vehicle of yours
+
+It names each device that is missing and how to check it, waits, and uses a device that is plugged
+in later. Nothing arms by itself: uam start in another shell, or the cockpit's button. Ctrl-C on the
+ground ends all nodes and keeps the log; in the air it commands a landing, a second one ends the
+nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/hardware.md. Exit
+status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 130 ended by Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -22,33 +39,11 @@ from uam_lab.records.results.terminal import say
 
 UNIT = "systemd/uam-vehicle.service"
 DONE = 0
-EXAMPLES = """\
-examples:
-  uam vehicle --example > my_lab.yaml        the template of a lab file, with comments
-  uam vehicle --config my_lab.yaml           drivers, estimator, mission, controllers, bridge ...
-  uam vehicle --config my_lab.yaml --dry-run        all commands computed, none sent, nothing armed
-  uam vehicle import drone.urdf              the files of a vehicle of yours: uam vehicle import -h
-  uam vehicle --config my_lab.yaml --systemd | sudo tee /etc/systemd/system/uam-vehicle.service
-  uam vehicle design my/quad.yaml            gains and profile of a vehicle of yours
-
-It names each device that is missing and how to check it, waits, and uses a device that is plugged
-in later. Nothing arms by itself: uam start in another shell, or the cockpit's button. Ctrl-C on the
-ground ends all nodes and keeps the log; in the air it commands a landing, a second one ends the
-nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/hardware.md. Exit
-status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 130 ended by Ctrl-C.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "vehicle",
-        run,
-        "bring a real vehicle up and fly it",
-        "Start the drivers and the nodes of a real vehicle, as its lab file describes it.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.config()
     command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
     text = "result folder (default <out of the lab file>/<time>-<scenario>)"

@@ -1,4 +1,17 @@
-"""`uam vehicle design`: gains of the autopilot and a profile from a vehicle's numbers."""
+"""`uam vehicle design`: gains of the autopilot and a profile from the vehicle's numbers.
+
+Design the gains of the autopilot and the flying profile of a vehicle from its file, with stated
+margins, and say what limits each loop.
+
+examples:
+  uam vehicle design my/quad.yaml            profile, autopilot and pictures beside my/quad.yaml
+  uam vehicle design my/quad.yaml --out mine in the folder mine
+  uam vehicle design my/quad.yaml --criteria my/margins.yaml      other margins, see docs/tuning.md
+
+A vehicle whose file names neither profiles nor autopilot flies with the design beside it:
+uam fly --vehicle my/quad.yaml. The margins are those of uam margins. Exit status: 0 designed,
+2 wrong use, or no gains keep the margins.
+"""
 
 from __future__ import annotations
 
@@ -12,29 +25,11 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 DONE = 0
-EXAMPLES = """\
-examples:
-  uam vehicle design my/quad.yaml            profile, autopilot and pictures beside my/quad.yaml
-  uam vehicle design my/quad.yaml --out mine in the folder mine
-  uam vehicle design my/quad.yaml --criteria my/margins.yaml      other margins, see docs/tuning.md
-
-A vehicle whose file names neither profiles nor autopilot flies with the design beside it:
-uam fly --vehicle my/quad.yaml. The margins are those of uam margins. Exit status: 0 designed,
-2 wrong use, or no gains keep the margins.
-"""
 
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to those of `uam vehicle`."""
-    command = Command(
-        commands,
-        "design",
-        run,
-        "gains of the autopilot and a profile from the vehicle's numbers",
-        "Design the gains of the autopilot and the flying profile of a vehicle from its file, with "
-        "stated margins, and say what limits each loop.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
     command.option("name", "NAME|FILE", f"{vehicles}, or the description of a vehicle")
     text = "entries in place of those of config/design/criteria.yaml"

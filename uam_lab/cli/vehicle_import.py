@@ -1,18 +1,8 @@
-"""`uam vehicle import`: the files of a vehicle from its URDF or MJCF."""
+"""`uam vehicle import`: a vehicle from its URDF or MJCF.
 
-from __future__ import annotations
+Find base, arm, end effector, rotors and feet of a URDF or MJCF, ask for what it cannot hold, and
+write the files of a vehicle.
 
-import argparse
-import sys
-from pathlib import Path
-from typing import Any
-
-from uam_control.vehicle import DEFAULT_VEHICLE, load_description
-from uam_lab.cli.command import Command, Subcommands
-from uam_lab.records.results.terminal import say
-
-DONE = 0
-EXAMPLES = """\
 examples:
   uam vehicle import drone.urdf                          writes drone/: drone.yaml, drone.xml ...
   uam vehicle import drone.urdf --out my --set rotors.thrust_max=8.2 --set servo=XM430-W350
@@ -29,6 +19,19 @@ docs/your_vehicle.md. Exit status: 0 written, 2 wrong use or a description that 
 and line.
 """
 
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
+from uam_lab.cli.command import Command, Subcommands
+from uam_lab.records.results.terminal import say
+
+DONE = 0
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to those of `uam vehicle`."""
@@ -37,15 +40,7 @@ def add(commands: Subcommands) -> None:
 
     questions = Answers().assumed.mapping("questions")
     keys = "\n".join(f"  {key:22} {what} [{unit}]" for key, (what, unit) in questions.items())
-    command = Command(
-        commands,
-        "import",
-        run,
-        "a vehicle from its URDF or MJCF",
-        "Find base, arm, end effector, rotors and feet of a URDF or MJCF, ask for what it cannot "
-        "hold, and write the files of a vehicle.",
-        EXAMPLES % (DEFAULT_VEHICLE, keys, ", ".join(servo_types())),
-    )
+    command = Command(commands, __doc__ % (DEFAULT_VEHICLE, keys, ", ".join(servo_types())), run)
     command.argument("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
     command.option("--out", "DIR", "folder of the files (default ./NAME)", type=Path)
     command.option("--name", "NAME", "of the vehicle (default: that of the file)", "")

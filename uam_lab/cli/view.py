@@ -1,16 +1,7 @@
-"""`uam view`: the cockpit for running nodes, of `uam fly` or on the vehicle."""
+"""`uam view`: the cockpit, a local web page, for running nodes.
 
-from __future__ import annotations
+Serve the cockpit: the scene, charts, gains and commands in a browser.
 
-import argparse
-import json
-import os
-import sys
-
-from uam_lab.cli.command import Command, Subcommands, chosen_flight
-from uam_lab.flights.flight_settings import require_ros
-
-EXAMPLES = """\
 examples:
   uam view                                 the running flight
   ROS_DOMAIN_ID=5 uam view                 nodes not started by uam fly, as on the vehicle
@@ -22,17 +13,20 @@ The 3-D scene needs the node `scene`: uam fly starts it, otherwise ros2 run uam_
 Ctrl-C ends the cockpit; the flight continues.
 """
 
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+
+from uam_lab.cli.command import Command, Subcommands, chosen_flight
+from uam_lab.flights.flight_settings import require_ros
+
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
-    command = Command(
-        commands,
-        "view",
-        run,
-        "the cockpit, a local web page, for running nodes",
-        "Serve the cockpit: the scene, charts, gains and commands in a browser.",
-        EXAMPLES,
-    )
+    command = Command(commands, __doc__, run)
     command.instance()
     command.option(
         "--host", "ADDRESS", "address to listen on; the default is this computer only", "127.0.0.1"
