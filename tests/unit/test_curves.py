@@ -105,6 +105,22 @@ def test_minimum_snap_passes_its_points_smoothly(points):
         np.testing.assert_allclose(end[1:4], 0.0, atol=1e-6)
 
 
+def test_times_between_points_are_in_proportion_to_the_roots_of_the_distances():
+    along = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 1.0, 0.0]])
+    np.testing.assert_allclose(shares(along), [0.0, 1 / 3, 2 / 3, 1.0], atol=1e-12)
+
+
+def test_the_curve_stays_near_points_that_are_unequally_far_apart():
+    points = np.array(
+        [[-1.0, 0.5, 1.2], [-0.2, 1.2, 1.9], [0.2, 1.2, 1.2], [1.9, 0.4, 2.1], [-1.8, 1.5, 1.5]]
+    )
+    places = minimum_snap(shares(points), points).rows(np.linspace(0.0, 1.0, 500))[0]
+    beyond = np.maximum(
+        places.max(axis=0) - points.max(axis=0), points.min(axis=0) - places.min(axis=0)
+    )
+    assert beyond.max() < 1.0  # 4.5 m with times in proportion to the distances
+
+
 def test_minimum_snap_has_less_snap_than_a_neighbour():
     points = np.array([[0.0], [2.0], [1.0]])
 

@@ -315,7 +315,7 @@ def test_the_vehicles_own_full_thrust_limits_a_reference(full, limit):
 def test_what_a_weak_vehicle_cannot_lift_is_refused_and_retimed():
     weak = Feasibility(with_full_thrust(28.06), OPEN, 0.2)
     race = load_scenario("race_5_payload")
-    with pytest.raises(InfeasibleReference, match="thrust 29.5 N exceeds 23.9 N, 85 % of the full"):
+    with pytest.raises(InfeasibleReference, match="thrust 29.6 N exceeds 23.9 N, 85 % of the full"):
         weak.check(race)
     with pytest.raises(InfeasibleReference, match=r"thrust .* exceeds 23.9 N.* does not help"):
         replace(weak, payload_mass=0.7).retimed(race)  # the weight alone is 28.4 N

@@ -59,11 +59,12 @@ def _derivatives(u: float) -> np.ndarray:
 
 
 def shares(points: np.ndarray) -> np.ndarray:
-    """Return times (m,) from 0 to 1 for points (m, 3) [m]: in proportion to the distances.
+    """Return times (m,) from 0 to 1 for points (m, 3) [m]: in proportion to the distances' roots.
 
-    The first and the last piece, from rest and to rest, have END_SHARE times as much.
+    So each piece needs about the same acceleration. In proportion to the distances themselves the
+    curve swings far out between points that are not equally far apart. The first and the last piece
+    have END_SHARE times as much.
     """
-    ways = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    ways[0] *= END_SHARE
-    ways[-1] *= END_SHARE
-    return np.append(0.0, np.cumsum(ways)) / ways.sum()
+    widths = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    widths[[0, -1]] *= END_SHARE
+    return np.append(0.0, np.cumsum(widths)) / widths.sum()
