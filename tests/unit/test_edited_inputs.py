@@ -1,25 +1,15 @@
-"""Rows of a table belong to the content of the input files; options that cannot act are refused."""
+"""Rows of a table belong to the content of the input files."""
 
 from dataclasses import replace
 
 import pytest
+from adapting.flights import StudyFlight, mark
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
-from uam_lab.experiments.study.flights import StudyFlight, mark
 from uam_lab.records.results import row_table
 from uam_lab.records.results.row_table import RowTableError
-
-FOREIGN = {
-    "--vehicle": "s500_arm",
-    "--scenario": "pick_and_place",
-    "--payload-mass": "0.2",
-    "--rows": "proposed",
-    "--profile": "mine=s500",
-    "--plant-preset": "calm",
-    "--effect": "ground_effect",
-}
 
 
 @pytest.fixture
@@ -68,18 +58,3 @@ def test_a_study_knows_an_edited_scenario_and_another_vehicle_of_the_same_name(s
     assert mark(edited) != before
     edit(scenario)
     assert mark(trial) != before
-
-
-@pytest.mark.parametrize("option", FOREIGN)
-def test_a_study_refuses_options_that_are_not_its_own(option, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare", "--study", "adaptation", "--design", option, FOREIGN[option]]) == 2
-    out, err = capsys.readouterr()
-    assert f"{option}: not with --study, which has its own" in err
-    assert err.count("\n") == 1 and not out and not any(tmp_path.iterdir())
-
-
-def test_parts_of_a_study_need_one(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare", "--part", "arm", "--design"]) == 2
-    assert "--part, --design: only with --study" in capsys.readouterr().err

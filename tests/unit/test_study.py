@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from adapting import design, report
+from adapting.description import StudyError, load_study
+from adapting.flights import FLOWN, StudyResult
+from adapting.run import FILE, Runner
+from adapting.search import cost, search
 
 from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
 from uam_control.mission import load_scenario
-from uam_lab.experiments.study import design, report
-from uam_lab.experiments.study.description import StudyError, load_study
-from uam_lab.experiments.study.flights import FLOWN, StudyResult
-from uam_lab.experiments.study.run import FILE, Runner
-from uam_lab.experiments.study.search import cost, search
 from uam_lab.experiments.trials import experiment
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.flights.flight_settings import FlightSettings
@@ -39,7 +39,7 @@ LAWS = (
 
 @pytest.fixture(scope="module")
 def study():
-    return load_study("adaptation")
+    return load_study()
 
 
 def slopes(p, gains):
@@ -96,7 +96,7 @@ def test_pd_to_the_same_margin_has_the_gains_of_the_law_at_its_ceilings(study, s
 
 
 def test_the_strengths_leave_the_stated_margins(study):
-    from uam_lab.experiments.study.run import margins
+    from adapting.run import margins
 
     labels = ("PD", "proposed", "PD to the same margin", "ASMC-1 (reconstructed)")
     rows = [one for one in study.rows if one.label in labels]
@@ -111,7 +111,7 @@ def test_the_strengths_leave_the_stated_margins(study):
 @pytest.mark.long
 def test_the_row_as_converged_has_the_margins_of_its_gains(study):
     """rho of 0.7 of the ceiling's: 1/(1 + 0.7 g) of PD's delay margin is a rough rule."""
-    from uam_lab.experiments.study.run import margins
+    from adapting.run import margins
 
     row = next(one for one in study.rows if one.frozen == "converged")
     with pytest.raises(ValueError, match="needs the gains"):
@@ -190,8 +190,6 @@ def test_sentences_count_what_adaptation_carries_and_where_it_wins(study):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"spend": 1.5}, "spend: 1.5 is outside 0 to 1"),
-        ({"spend": "half"}, "spend: a number expected, got 'half'"),
         ({"rows": {"proposed": None}}, "rows.proposed: a mapping expected, got None"),
         ({"rows": {"a": {"law": "pid"}}}, "rows.a.law: 'pid'"),
         ({"rows": {"a": {"law": "modular", "frozen": "half"}}}, "rows.a.frozen: 'half'"),
@@ -199,15 +197,13 @@ def test_sentences_count_what_adaptation_carries_and_where_it_wins(study):
         ({"conditions": {"a": {"value": "large"}}}, "conditions.a.value: a number expected"),
         ({"conditions": {"a": None}}, "conditions.a: a mapping expected"),
         ({"nominal": {"vehicle": 3}}, "nominal.vehicle: a mapping expected"),
-        ({"ranges": {"modular": [1]}}, "ranges.modular: a mapping expected"),
-        ({"extra": 1}, "extra: unknown; allowed: vehicle"),
     ],
 )
 def test_a_wrong_study_is_refused_in_one_line(study, tmp_path, change, text):
     file = tmp_path / "mine.yaml"
     file.write_text(json.dumps(study.document | change))
     with pytest.raises(StudyError, match=text.replace("(", "\\(")) as error:
-        load_study(str(file))
+        load_study(file)
     assert "\n" not in str(error.value)
 
 
@@ -226,7 +222,7 @@ def test_the_same_study_gives_the_same_numbers_and_continues(study, tmp_path, mo
     }
     file = tmp_path / "tiny.yaml"
     file.write_text(json.dumps(document))
-    tiny = load_study(str(file))
+    tiny = load_study(file)
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:
         folder.mkdir()

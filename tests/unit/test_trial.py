@@ -7,6 +7,8 @@ from dataclasses import fields
 
 import pytest
 import yaml
+from adapting import flights
+from adapting.flights import StudyFlight
 from default_columns import COLUMNS
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,8 +16,6 @@ from hypothesis import strategies as st
 from uam_control.profiles.profile import load_profile
 from uam_lab.cli.command import seed
 from uam_lab.experiments.campaign.variations import Draws, VariationError, ranges
-from uam_lab.experiments.study import flights
-from uam_lab.experiments.study.flights import StudyFlight
 from uam_lab.experiments.trials import trial
 from uam_lab.experiments.trials.trial import Trial, TrialFailed
 from uam_lab.flights.direct.flight import DirectFlight

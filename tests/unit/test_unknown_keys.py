@@ -11,7 +11,6 @@ from uam_control.settings import configuration, yaml_file
 from uam_control.vehicle import load_description
 from uam_lab.experiments.campaign import variations
 from uam_lab.experiments.faults import matrix as fault_matrix
-from uam_lab.experiments.study.description import load_study
 from uam_lab.experiments.tuning.space import load_space
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_sim_bridge.devices.mocap.calibration import load as load_calibration
@@ -32,11 +31,6 @@ KINDS = {
         "moments",
     ),
     "space": ("tuning/late_links", lambda file: load_space(str(file)), r"flights.*\.vehicle"),
-    "study": (
-        "studies/adaptation",
-        lambda file: load_study(str(file)),
-        r"(?!(rows|nominal|conditions)\b).*|rows|conditions|.*(vehicle|trajectory).*",
-    ),
     "calibration": ("mocap/motive_z_up", lambda file: load_calibration(str(file)), ""),
 }
 

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 Subcommands = argparse._SubParsersAction  # argparse has no other name for it
 WRONG_USE = 2  # exit status
-DEFAULT_SCENARIO = "pick_and_place"
 
 
 class Command:
@@ -117,13 +116,9 @@ class Command:
         """Add --vehicle; others: who else names one, "the lab file's", None is the default then."""
         vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
         text = f"{vehicles}, or the description of one: docs/your_vehicle.md"
-        self._unless("--vehicle", text, DEFAULT_VEHICLE, others)
-
-    def _unless(self, flag: str, text: str, default: str, others: str) -> None:
-        """Add an option for a name or file whose default is that of others, if they have one."""
         if others:
-            text += f" (default: {others}, {default} without)"
-        self.option(flag, "NAME|FILE", text, None if others else default)
+            text += f" (default: {others}, {DEFAULT_VEHICLE} without)"
+        self.option("--vehicle", "NAME|FILE", text, None if others else DEFAULT_VEHICLE)
 
     def config(self, default: str | None = None) -> None:
         """Add --config, the lab file."""
@@ -139,10 +134,10 @@ class Command:
         wait = number("time", "s", 0.0005, 5.0)
         self.option("--answer-timeout", "S", text, 0.05, type=wait)
 
-    def scenario(self, others: str = "") -> None:
-        """Add --scenario; others: as in `vehicle`."""
+    def scenario(self) -> None:
+        """Add --scenario."""
         text = f"{', '.join(configuration.names('scenarios'))}, or a .yaml or .csv file"
-        self._unless("--scenario", text, DEFAULT_SCENARIO, others)
+        self.option("--scenario", "NAME|FILE", text, "pick_and_place")
 
     def profile(self) -> None:
         """Add --profile, for `given_profile`."""

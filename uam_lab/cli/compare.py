@@ -11,9 +11,6 @@ examples:
   uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
   uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
   uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
-  uam compare --study adaptation       what adaptation buys: docs/adaptation.md
-  uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
-  uam compare --study adaptation --part varied --condition nominal hard --engine ros
 
 Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparison.json, figures/.
 The baselines are reconstructions (docs/law.md). The same command gives the same tables.
@@ -28,17 +25,14 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.cli import study
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.cli.command import (
-    DEFAULT_SCENARIO,
     Command,
     Subcommands,
     chosen_effects,
     count,
     number,
     place_of,
-    refuse_given,
 )
 from uam_lab.experiments.compare import plan
 from uam_lab.experiments.trials.trial import TrialResult, result_rows
@@ -49,15 +43,13 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
-SEEDS = 5
-
 
 def add(commands: Subcommands) -> None:
     """Add the subcommand to the command line."""
     command = Command(commands, __doc__, run)
-    command.vehicle("the study's")
-    command.scenario("the study's")
-    command.option("--seeds", "N", "seeds 1..N (default 5; with --study the study's)", type=count)
+    command.vehicle()
+    command.scenario()
+    command.option("--seeds", "N", "seeds 1..N", 5, type=count)
     mass = number("mass", "kg", 0.0, PAYLOAD_MAX)
     text = f"payloads (default {' '.join(map(str, plan.PAYLOADS))})"
     command.option("--payload-mass", "KG", text, type=mass, nargs="+")
@@ -66,16 +58,6 @@ def add(commands: Subcommands) -> None:
     command.option("--rows", "NAME", text, nargs="+", choices=tuple(plan.ROWS))
     command.repeated("--profile", "LABEL=FILE", "an additional row")
     command.plant()
-    studies = ", ".join(configuration.names("studies", (".yaml",)))
-    text = f"fly a study instead, with its own rows and flights: {studies}, or a file"
-    command.option("--study", "NAME|FILE", text)
-    text = f"parts of the study: {', '.join(study.PARTS)} (default: all)"
-    command.option("--part", "NAME", text, nargs="+", choices=study.PARTS)
-    text = "conditions of the study (default: all)"
-    command.option("--condition", "LABEL", text, nargs="+")
-    command.switch("--design", "only find the strengths of the study that its margins allow")
-    text = "only search the adaptation's numbers of the study, N evaluations per law"
-    command.option("--tune", "N", text, type=count)
     command.workers(with_ros=True)
     command.out()
 
@@ -94,25 +76,6 @@ def _about(result: TrialResult) -> str:
 
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
-    if options.study:
-        refuse_given(
-            "not with --study, which has its own",
-            vehicle=options.vehicle,
-            scenario=options.scenario,
-            payload_mass=options.payload_mass,
-            rows=options.rows,
-            profile=options.profile,
-            plant_preset=options.plant_preset,
-            effect=options.effects,
-        )
-        return study.run(options)
-    refuse_given(
-        "only with --study",
-        part=options.part,
-        condition=options.condition,
-        design=options.design,
-        tune=options.tune,
-    )
     from uam_lab.experiments.compare import comparison_report, modularity
     from uam_lab.experiments.trials.experiment import Experiment
     from uam_lab.experiments.trials.inputs import inputs
@@ -120,8 +83,8 @@ def run(options: argparse.Namespace) -> int:
     if options.engine == "ros":
         require_ros()
     place, payloads = place_of(options), tuple(options.payload_mass or plan.PAYLOADS)
-    vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
-    scenario = options.scenario or DEFAULT_SCENARIO
+    vehicle = load_description(options.vehicle)
+    scenario = options.scenario
     load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
     rows = (
         *plan.entries(options.rows or tuple(plan.ROWS), vehicle),
@@ -130,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)
-    seeds = tuple(range(1, (options.seeds or SEEDS) + 1))
+    seeds = tuple(range(1, options.seeds + 1))
     flights = plan.Flights(vehicle, scenario, payloads, seeds, options.engine, effects)
     trials = plan.trials(rows, flights, out / "flights")
     proposed = default_profile(catalogue.DEFAULT, vehicle)

@@ -1,26 +1,20 @@
-"""The description of a study: a file of config/studies."""
+"""The description of a study: study.yaml, or another file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
-from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.records.results.timeseries import SUBSYSTEMS
 
+STUDY = Path(__file__).parent / "study.yaml"
 NOMINAL = "nominal"
 FROZEN = ("", "zero", "margin", "converged")
-KEYS = (
-    *("vehicle", "autopilot", "shared", "law_parameters", "modular_parameters", "feedback"),
-    *("spend", "margin_loads", "strengths", "scenario", "judged", "nominal", "seeds", "rows"),
-    *("conditions", "factors", "nominal_values", "adaptation", "ranges", "tuning"),
-    *("law_sweep", "arm_sweep"),
-)
 
 
 class StudyError(ValueError):
@@ -90,15 +84,10 @@ class Study:
         return document
 
 
-def load_study(name_or_file: str) -> Study:
-    """Read a study of config/studies, or a file. Raises StudyError, ConfigurationError."""
-    file = configuration.named("studies", name_or_file, suffixes=(".yaml",))
+def load_study(file: Path = STUDY) -> Study:
+    """Read a study. Raises StudyError, ConfigurationError."""
     top = read_section(file, StudyError)
     document = top.values
-    top.only(KEYS)
-    for key in KEYS:
-        top.entry(key)
-    _check(top)
     given = top.section("rows")
     rows = tuple(_row(given.section(label), label) for label in given.values)
     base, varied = _mapping(top, "nominal"), _mapping(top, "conditions")
@@ -148,20 +137,3 @@ def _condition(label: str, base: Section, entry: Section) -> Condition:
     factor = entry.text("of", default="")
     value = entry.number("value", default=0.0)
     return Condition(label, vehicle, trajectory, factor, value)
-
-
-def _check(top: Section) -> None:
-    if set(top.section("feedback").values) != set(SUBSYSTEMS):
-        raise top.error("feedback", f"{', '.join(SUBSYSTEMS)} expected")
-    if not 0.0 < top.number("spend") < 1.0:
-        raise top.error("spend", f"{top.number('spend')} is outside 0 to 1")
-    top.whole("seeds")
-    ranges, adaptation = top.section("ranges"), top.section("adaptation")
-    for law in ranges.values:
-        allowed, known = ranges.section(law), adaptation.section(law)
-        if set(allowed.values) != set(known.values):
-            raise ranges.error(law, "the entries of adaptation expected")
-        for name in known.values:
-            (low, high), value = allowed.numbers(name, 2), known.number(name)
-            if not 0.0 < low <= value <= high:
-                raise known.error(name, f"{value} is outside {low} to {high}")

@@ -12,10 +12,10 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
+from adapting import law_terms
+from adapting.description import Condition, Study
 from uam_control.coordinates import ARM, ATTITUDE
 from uam_control.profiles.profile import Profile
-from uam_lab.analysis import law_terms
-from uam_lab.experiments.study.description import Condition, Study
 from uam_lab.experiments.trials.inputs import inputs
 from uam_lab.experiments.trials.outcome import LOST, classify
 from uam_lab.experiments.trials.rows import Rows

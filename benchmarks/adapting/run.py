@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_control.profiles.profile import Profile, load_profile
-from uam_lab.experiments.study import design
-from uam_lab.experiments.study.description import NOMINAL, Condition, Row, Study
-from uam_lab.experiments.study.flights import (
+from adapting import design
+from adapting.description import NOMINAL, Condition, Row, Study
+from adapting.flights import (
     ROWS,
     StudyFlight,
     StudyResult,
@@ -19,6 +18,7 @@ from uam_lab.experiments.study.flights import (
     mark,
     measure,
 )
+from uam_control.profiles.profile import Profile, load_profile
 from uam_lab.experiments.trials.experiment import Experiment
 from uam_lab.experiments.workers.place import Workplace
 

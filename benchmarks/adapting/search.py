@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import optuna
 
+from adapting import design
+from adapting.description import Row, Study
+from adapting.flights import StudyResult, flights, measure
 from uam_control.settings.parameter_file import ProfileError
-from uam_lab.experiments.study import design
-from uam_lab.experiments.study.description import Row, Study
-from uam_lab.experiments.study.flights import StudyResult, flights, measure
 
 DIGITS = 3  # significant digits of a value
 PATIENCE = 80  # last evaluations, which tell whether a search has converged

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_lab.experiments.study.description import Study
-from uam_lab.experiments.study.flights import StudyResult
-from uam_lab.experiments.study.run import PROPOSED, Margin, Swept
+from adapting.description import Study
+from adapting.flights import StudyResult
+from adapting.run import PROPOSED, Margin, Swept
 from uam_lab.records.results.templates import markdown_table
 from uam_lab.records.results.timeseries import SUBSYSTEMS
 

@@ -8,10 +8,10 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_lab.experiments.study.description import NOMINAL, Study
-from uam_lab.experiments.study.flights import StudyResult
-from uam_lab.experiments.study.report import mean, of
-from uam_lab.experiments.study.run import Swept
+from adapting.description import NOMINAL, Study
+from adapting.flights import StudyResult
+from adapting.report import mean, of
+from adapting.run import Swept
 from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_lab.report.figures import style
 

@@ -26,12 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from adapting.description import Row, Study
 from uam_control.profiles.profile import Profile, load_profile, profile_of
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
 from uam_lab.experiments.margins.loops import Analysis, analyse
 from uam_lab.experiments.margins.stack_model import Gains, stack_model
-from uam_lab.experiments.study.description import Row, Study
 from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.plant import Vehicle
 

@@ -1,0 +1,1 @@
+"""A study: laws of equal feedback and margin over varied flights."""

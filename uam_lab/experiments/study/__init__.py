@@ -1,1 +1,0 @@
-"""A study of `uam compare --study`: laws of equal feedback and margin over varied flights."""
