@@ -176,14 +176,14 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     assert np.isnan(series["rotor_1.thrust"]).all() and np.isnan(series["magnet.force"]).all()
     np.testing.assert_allclose(series["payload.y"], 2.0)
     np.testing.assert_array_equal(series["magnet.on"][[0, 499, 500]], [0.0, 0.0, 1.0])
-    assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed == 8
+    assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed_ticks == 8
     assert flight.wall_s == pytest.approx(2.996)
 
 
 def test_a_tick_is_missed_after_three_control_periods_of_the_vehicle(tmp_path):
     slower = replace(load_description(), control_period=0.008)
     flight = log_reader.read_flight(vehicles_log(tmp_path), load_scenario("hover"), vehicle=slower)
-    assert max(flight.latency_s) == pytest.approx(0.02) and flight.missed == 0
+    assert max(flight.latency_s) == pytest.approx(0.02) and flight.missed_ticks == 0
 
 
 class SetpointsOnly:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,9 @@ from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
-from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.flights.vehicle.lab import LabError
-from uam_lab.flights.vehicle.lab_file import load_lab, template
+from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
 from uam_lab.records.recording.node_statistics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
@@ -119,25 +119,26 @@ def words(arguments):
 
 def test_the_autopilot_is_the_stand_in_or_px4_on_both_of_its_lines(tmp_path):
     lab = load_lab(given(tmp_path, autopilot="serial:/dev/ttyUSB9:460800"))
-    options, devices = RehearsalOptions(), tmp_path / "devices"
-    module, own = laboratory_process.autopilot(lab, options, devices, tmp_path, PORTS)
+    settings, devices = settings_of(lab), tmp_path / "devices"
+    module, own = laboratory_process.autopilot(lab, settings, devices, tmp_path, PORTS)
     assert module == "uam_sim_bridge.autopilot.server" and words(own)["--sim-port"] == ["4563"]
     assert words(own)["--companion"] == [f"{devices}/ttyAUTOPILOT:460800"]
-    options = RehearsalOptions(px4=Px4Installation(tmp_path), px4_params=("SDLOG_MODE=0",))
-    module, own = laboratory_process.autopilot(lab, options, devices, tmp_path, PORTS)
+    px4 = Px4Installation(tmp_path)
+    settings = replace(settings, px4=px4, px4_params=("SDLOG_MODE=0",))
+    module, own = laboratory_process.autopilot(lab, settings, devices, tmp_path, PORTS)
     found = words(own)
     assert module == "uam_sim_bridge.px4.hitl" and found["--instance"] == ["3"]
     assert found["--companion"] == [f"{devices}/ttyAUTOPILOT:460800"]
     assert found["--usb"] == [f"{devices}/ttyUSB"] and found["--px4-dir"] == [str(tmp_path)]
     assert found["--param"] == ["SDLOG_MODE=0"] and found["--log"] == [f"{tmp_path}/px4.ulg"]
     assert [Path(one).name for one in found["--params"]] == ["sitl.yaml", "rehearsed.yaml"]
-    room = {"environment": [{"kind": "stand"}]}
-    settings = laboratory_process.parameters(lab, options, devices, tmp_path, PORTS, room)
-    assert json.loads(settings["vehicle_changes"])["environment"] == room["environment"]
-    assert settings["hil"] == "line"
+    values = laboratory_process.parameters(lab, settings, devices, tmp_path, PORTS)
+    surroundings = settings.scenario.surroundings
+    assert surroundings.items() <= json.loads(values["vehicle_changes"]).items()
+    assert values["hil"] == "line"
     # what PX4 gets is what the list of a vehicle requires, except that it is in the loop
     values = px4_parameters.load(lab.vehicle, found["--params"], found["--param"])
-    required = laboratory_process.required_parameters(options.px4, tmp_path)
+    required = laboratory_process.required_parameters(px4, tmp_path)
     rules = RequiredParameters.read(required["required_parameters"])
     assert set(rules) == set(RequiredParameters.read("vehicle"))
     for name, value in hitl.loop_values(values, lab.vehicle).items():
@@ -151,11 +152,12 @@ def test_a_gripper_is_on_its_output(tmp_path):
     document = yaml.safe_load(template()) | {"magnet": magnet}
     file = tmp_path / "lab.yaml"
     file.write_text(yaml.safe_dump(document))
-    lab, options = load_lab(file), RehearsalOptions(px4=Px4Installation(tmp_path))
-    _, own = laboratory_process.autopilot(lab, options, tmp_path, tmp_path, PORTS)
+    lab = load_lab(file)
+    settings = replace(settings_of(lab), px4=Px4Installation(tmp_path))
+    _, own = laboratory_process.autopilot(lab, settings, tmp_path, tmp_path, PORTS)
     assert words(own)["--param"] == ["PWM_MAIN_FUNC12=430"]
-    settings = laboratory_process.parameters(lab, options, tmp_path, tmp_path, PORTS, {})
-    assert (settings["magnet_on"], settings["magnet_off"], settings["magnet_output"]) == (1, -1, 2)
+    values = laboratory_process.parameters(lab, settings, tmp_path, tmp_path, PORTS)
+    assert (values["magnet_on"], values["magnet_off"], values["magnet_output"]) == (1, -1, 2)
 
 
 def report(name, **values):
@@ -256,7 +258,7 @@ def test_ctrl_c_ends_a_matrix_of_rehearsals_and_the_same_command_continues(
         "{fault: mocap_renamed}]}"
     )
 
-    def fly(lab, settings, options, observer, stop):
+    def fly(lab, settings, observer, stop, checklist):
         flown.append(settings.faults)
         if len(flown) == 2:
             stop.repeat()

@@ -89,36 +89,30 @@ def run(options: argparse.Namespace) -> int:
     require_ros()
     from uam_lab.flights.rehearsal import device_figures
     from uam_lab.flights.rehearsal.engine import fly
-    from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 
     lab = load_lab(options.config)
     if options.scenario:
         lab = replace(lab, scenario=options.scenario)
     settings = settings_of(lab, command_line())
     mass = settings.payload_mass if options.payload_mass is None else options.payload_mass
-    changes = presets.added({}, chosen_effects(options))
-    settings = replace(
-        settings, seed=options.seed, payload_mass=mass, out=options.out, vehicle_changes=changes
-    )
     cables = read_schedule(options.cables, settings.scenario, options.seed)
     for one in cables.faults:
         if one.fault.PLACE != CABLE:
             raise FaultError(f"{one.fault.NAME}: not of a cable: uam fly --fault")
-    settings = replace(settings, faults=cables)
-    px4 = px4_of(options.px4_dir, options.px4_params)
-    rehearsal = RehearsalOptions(
+    settings = replace(
+        settings,
         seed=options.seed,
         payload_mass=mass,
-        vehicle_changes=changes,
+        out=options.out,
+        vehicle_changes=presets.added({}, chosen_effects(options)),
         faults=cables,
-        arm_start=tuple(settings.scenario.arm_start),
-        px4=px4,
+        px4=px4_of(options.px4_dir, options.px4_params),
         px4_params=tuple(options.px4_params),
     )
     console = Terminal()
     landing = settings.scenario.landing
     with Progress(console, landing.end) as progress, Interrupts() as stop:
-        folder, outcome, metrics = fly(lab, settings, rehearsal, progress, stop)
+        folder, outcome, metrics = fly(lab, settings, progress, stop)
     result = FlightResult(folder, metrics, outcome)
     further = device_figures.lines(device_figures.saved(folder))
     return tell(console, settings, result, "rehearse", options.video, options.report, further)

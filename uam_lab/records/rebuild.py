@@ -17,7 +17,6 @@ from uam_lab.records.recording.node_statistics import LABORATORY_FILE, latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.completion import complete
-from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError
 
 LOG, TABLE = "log.mcap", "timeseries.parquet"
@@ -43,22 +42,18 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     known = facts.info or before
     flown = _scenario(directory, facts, known, scenario)
     vehicle = _vehicle(known)
-    flight = read_flight(log, flown, vehicle=vehicle)
+    outcome = read_flight(log, flown, vehicle=vehicle)
     numbers = _json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
-    latency, missed = flight.latency_s, flight.missed
+    latency, missed = outcome.latency_s, outcome.missed_ticks
     if (directory / "logs" / LABORATORY_FILE).exists():  # of a rehearsal
         latency, missed = latencies(Log.read(log), vehicle.control_period)
-    outcome = Outcome(
-        series=None,
-        wall_s=numbers.get("wall_s") or before.get("wall_s") or flight.wall_s,
-        latency_s=numbers.get("latency_s", latency) if realtime else None,
-        missed_ticks=numbers.get("missed_ticks", missed) if realtime else None,
-        errors_of=flight.errors_of,
-        notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
-    )
-    flight.tell(outcome)
-    if not flight.done:
+    outcome.wall_s = numbers.get("wall_s") or before.get("wall_s") or outcome.wall_s
+    outcome.latency_s = numbers.get("latency_s", latency) if realtime else None
+    outcome.missed_ticks = numbers.get("missed_ticks", missed) if realtime else None
+    earlier = [note for note in before.get("notes") or [] if not note.startswith(PARTIAL)]
+    outcome.notes = list(dict.fromkeys([*earlier, *outcome.notes]))
+    if not outcome.done:
         outcome.failure = before.get("abort_reason") or CUT_OFF
     out.mkdir(parents=True, exist_ok=True)
     for name in FILES:

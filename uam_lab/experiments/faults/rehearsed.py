@@ -16,7 +16,6 @@ from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.engine import fly
-from uam_lab.flights.rehearsal.laboratory_process import RehearsalOptions
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of
 from uam_lab.records.results.outcome import Outcome
 from uam_sim_bridge.faults.feasibility import REHEARSAL
@@ -44,17 +43,10 @@ def measure(trial: RehearsedTrial) -> FaultResult:
     cell = trial.cell
     lab = replace(load_lab(trial.lab), scenario=trial.scenario)
     settings = settings_of(lab)
-    options = RehearsalOptions(
-        seed=trial.seed,
-        payload_mass=settings.payload_mass,
-        faults=cell.schedule,
-        arm_start=tuple(settings.scenario.arm_start),
-        checklist=with_checklist(cell),
-    )
     with tempfile.TemporaryDirectory(prefix="uam-rehearsal-") as folder, Interrupts() as stop:
         out = Path(folder) / "flight"
         made = replace(settings, out=out, seed=trial.seed, faults=cell.schedule)
-        _, outcome, figures = fly(lab, made, options, Observer(), stop)
+        _, outcome, figures = fly(lab, made, Observer(), stop, with_checklist(cell))
         if stop.raised:
             raise KeyboardInterrupt
         result = judged(cell, outcome, figures)

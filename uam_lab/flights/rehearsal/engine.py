@@ -14,7 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from uam_control.mission.time_limit import time_limit
 from uam_lab.flights.conclude import conclude
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
@@ -27,10 +26,10 @@ from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_p
 from uam_lab.flights.rehearsal.laboratory_process import (
     LABORATORY,
     LABORATORY_MODULE,
-    RehearsalOptions,
 )
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
+from uam_lab.flights.ros.logged_outcome import logged
 from uam_lab.flights.ros.status_listener import StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab import Lab
@@ -38,13 +37,10 @@ from uam_lab.flights.vehicle.lab_file import settings_of
 from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_engine import start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
-from uam_lab.records.recording.log_reader import read_flight
 from uam_lab.records.recording.logged_topics import Log
-from uam_lab.records.recording.mcap_reader import UnreadableLog
 from uam_lab.records.recording.node_statistics import (
     LABORATORY_FILE,
     latencies,
-    losses,
     statistics,
 )
 from uam_lab.records.results.outcome import Outcome
@@ -74,27 +70,18 @@ def read_outcome(
 
     failure: the failed node, if any; refused: why the mission was not started, "" if it was.
     """
-    outcome = Outcome(series=None, interrupted=interrupted)
-    logs = folder.path / "logs"
-    numbers = statistics(logs / LABORATORY_FILE)
+    numbers = statistics(folder.path / LOGS / LABORATORY_FILE)
+    lost = numbers.get("lost_s")
+    notes = [f"the plant could not keep real time: {lost:.2f} s lost"] if lost else []
+    outcome = logged(settings, folder, failure, interrupted, notes)
     if refused:
-        outcome.failure = REFUSED + refused
-    elif failure is not None and not interrupted:
-        outcome.failure, outcome.details = str(failure), failure.last_lines
+        outcome.failure, outcome.details = REFUSED + refused, ()
     outcome.wall_s = float(numbers.get("wall_s", 0.0))
-    if lost := numbers.get("lost_s"):
-        outcome.notes.append(f"the plant could not keep real time: {lost:.2f} s lost")
-    outcome.notes.extend(losses(logs))
-    try:
-        log = Log.read(folder.log)
-        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
-    except (UnreadableLog, OSError) as error:
-        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+    if outcome.series is None:
         return outcome
-    period = settings.vehicle.control_period
-    outcome.latency_s, outcome.missed_ticks = latencies(log, period)
-    flight.tell(outcome)
-    if not flight.done and not outcome.partial:
+    found = latencies(Log.read(folder.log), settings.vehicle.control_period)
+    outcome.latency_s, outcome.missed_ticks = found
+    if not outcome.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome
 
@@ -102,8 +89,9 @@ def read_outcome(
 class RehearsalEngine:
     """`fly` is an engine of `library.Flight`."""
 
-    def __init__(self, lab: Lab, options: RehearsalOptions) -> None:
-        self._lab, self._options = lab, options
+    def __init__(self, lab: Lab, checklist: bool) -> None:
+        """checklist: whether the lists are required and a person does them."""
+        self._lab, self._checklist = lab, checklist
 
     def fly(
         self, settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
@@ -125,15 +113,14 @@ class RehearsalEngine:
             modules = vehicle_nodes.processes(lab)
             supervise.prepare([*modules.values(), LABORATORY_MODULE], observer)
             sections = vehicle_nodes.parameters(lab, settings, folder)
-            required = laboratory_process.required_parameters(self._options.px4, logs)
+            required = laboratory_process.required_parameters(settings.px4, logs)
             sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
-            _prepare_checklist(sections, self._options.checklist)
+            _prepare_checklist(sections, self._checklist)
             sections[LABORATORY] = laboratory_process.parameters(
-                *(lab, self._options, devices, logs, ports),
-                *(settings.scenario.surroundings, _flight_limit(settings)),
+                lab, settings, devices, logs, ports, self._checklist
             )
             node_arguments.write(sections, settings, folder)
-            rehearsal = _Rehearsal(lab, settings, self._options, folder, ports, observer, stop)
+            rehearsal = _Rehearsal(lab, settings, folder, ports, observer, stop, self._checklist)
             failure = rehearsal.run(devices)
         refused = rehearsal.refused
         if failure is not None and not rehearsal.started and failure.name not in OWN:
@@ -141,16 +128,6 @@ class RehearsalEngine:
         outcome = read_outcome(settings, folder, failure, refused, stop.raised)
         write_json(folder.path / device_figures.NAME, device_figures.read(folder.log, logs))
         return outcome
-
-
-def _flight_limit(settings: FlightSettings) -> float:
-    """Return the time [s] after arming that ends a flight with faults, which may never land.
-
-    0, never, without faults: a person may fly by goals.
-    """
-    if not settings.faults:
-        return 0.0
-    return time_limit(settings.scenario, None)
 
 
 def _prepare_checklist(sections: dict[str, dict[str, Any]], required: bool) -> None:
@@ -172,16 +149,16 @@ class _Rehearsal:
         self,
         lab: Lab,
         settings: FlightSettings,
-        options: RehearsalOptions,
         folder: ResultFolder,
         ports: Ports,
         observer: Observer,
         stop: StopRequest,
+        checklist: bool,
     ) -> None:
-        self._lab, self._settings, self._options = lab, settings, options
+        self._lab, self._settings = lab, settings
         self._folder, self._ports, self._observer, self._stop = folder, ports, observer, stop
         self.refused, self.started = "", False
-        self._lists = options.checklist and CHECKLIST in vehicle_nodes.modules(lab)
+        self._lists = checklist and CHECKLIST in vehicle_nodes.modules(lab)
 
     def run(self, devices: Path) -> NodeFailed | None:
         """Run all processes until the laboratory ends or the start is refused."""
@@ -227,7 +204,7 @@ class _Rehearsal:
                 return False
             time.sleep(POLL)
         module, own = laboratory_process.autopilot(
-            self._lab, self._options, devices, self._folder.path, self._ports
+            self._lab, self._settings, devices, self._folder.path, self._ports
         )
         children.start(AUTOPILOT, module, own, may_end=True)
         return True
@@ -288,15 +265,17 @@ class RehearsalCourse:
 def fly(
     lab: Lab,
     settings: FlightSettings,
-    options: RehearsalOptions,
     observer: Observer,
     stop: StopRequest,
+    checklist: bool = True,
 ) -> tuple[Path, Outcome, dict[str, Any] | None]:
     """Rehearse; return result folder, outcome and metrics, None if nothing was recorded.
+
+    checklist: whether the lists are required and a person does them.
 
     Raises ResultFolderError, PortError, LabError.
     """
     prepare(observer.message)
     folder = ResultFolder.create(settings.scenario.name, "rehearsal", settings.out)
-    outcome = RehearsalEngine(lab, options).fly(settings, folder, observer, stop)
+    outcome = RehearsalEngine(lab, checklist).fly(settings, folder, observer, stop)
     return folder.path, outcome, conclude(settings, folder, outcome)

@@ -6,21 +6,21 @@ The autopilot is the stand-in, or a PX4 in HITL with both of its lines as pseudo
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from uam_control.mission.time_limit import time_limit
 from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.configuration import ConfigurationError
+from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.rehearsal.emulated_lab import MAGNET_LINE, baud_of
 from uam_lab.flights.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.records.recording.node_statistics import LABORATORY_FILE
-from uam_sim_bridge.faults import CABLE, Schedule
+from uam_sim_bridge.faults import CABLE
 from uam_sim_bridge.laboratory.laboratory import SERIAL_FAR, USB
 from uam_sim_bridge.nodes.laboratory_options import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.ports import Ports
@@ -35,45 +35,20 @@ REQUIRED, IN_THE_LOOP = "px4/vehicle.yaml", "px4_parameters.yaml"  # in config/,
 GRIPPER_ON, GRIPPER_OFF = 1.0, -1.0  # outputs of a closed and an open gripper
 
 
-@dataclass(frozen=True)
-class RehearsalOptions:
-    """seed: of all noise; payload_mass [kg]; vehicle_changes: of the plant, effects
-    too; faults: of cables.
-
-    arm_start (n,) [rad]: joint angles on the ground, () for stowed; checklist: whether the lists
-    are required and a person does them; px4: a build without lockstep
-    that flies in the stand-in's place, px4_params: NAME=VALUE for it.
-    """
-
-    seed: int = 1
-    payload_mass: float = 0.0
-    vehicle_changes: Mapping[str, object] = field(default_factory=dict)
-    faults: Schedule = Schedule()
-    arm_start: tuple[float, ...] = ()
-    checklist: bool = True
-    px4: Px4Installation | None = None
-    px4_params: tuple[str, ...] = ()
-
-
 def parameters(
-    lab: Lab,
-    options: RehearsalOptions,
-    devices: Path,
-    logs: Path,
-    ports: Ports,
-    surroundings: Mapping[str, Any],
-    flight_limit: float = 0.0,
+    lab: Lab, settings: FlightSettings, devices: Path, logs: Path, ports: Ports, person: bool = True
 ) -> dict[str, Any]:
     """Return the parameters of the laboratory; lab: as rehearsed; devices, logs: folders.
 
-    surroundings: of the scenario; flight_limit [s]: see `LaboratoryParameters`.
+    person: whether the lists are required and a person does them.
     """
+    changes = dict(settings.vehicle_changes) | settings.scenario.surroundings
     found = {
         "vehicle": lab.vehicle.source,
-        "vehicle_changes": json.dumps(dict(options.vehicle_changes) | surroundings),
-        "payload_mass": float(options.payload_mass),
-        "seed": options.seed,
-        "arm_start": list(options.arm_start),
+        "vehicle_changes": json.dumps(changes),
+        "payload_mass": float(settings.payload_mass),
+        "seed": settings.seed,
+        "arm_start": list(settings.scenario.arm_start),
         "folder": str(devices),
         "hardware": str(lab.arm_file),
         "baud": baud_of(lab),
@@ -83,10 +58,10 @@ def parameters(
         **_magnet_output(lab),
         "imu": lab.imu,
         "hil_port": ports.simulator_tcp,
-        "hil": TCP if options.px4 is None else LINE,
-        "faults": options.faults.only(CABLE).to_text(),
-        "person": options.checklist,
-        "flight_limit": flight_limit,
+        "hil": TCP if settings.px4 is None else LINE,
+        "faults": settings.faults.only(CABLE).to_text(),
+        "person": person,
+        "flight_limit": _flight_limit(settings),
         "statistics": str(logs / LABORATORY_FILE),
     }
     found["poses"] = TOPIC if lab.mocap is None else NATNET
@@ -102,6 +77,14 @@ def parameters(
     return found
 
 
+def _flight_limit(settings: FlightSettings) -> float:
+    """Return the time [s] after arming that ends a flight with faults, which may never land.
+
+    0, never, without faults: a person may fly by goals.
+    """
+    return time_limit(settings.scenario, None) if settings.faults else 0.0
+
+
 def _magnet_output(lab: Lab) -> dict[str, Any]:
     """Return the parameters of the autopilot's output with the magnet."""
     output = lab.magnet.output
@@ -112,7 +95,7 @@ def _magnet_output(lab: Lab) -> dict[str, Any]:
 
 
 def autopilot(
-    lab: Lab, options: RehearsalOptions, devices: Path, folder: Path, ports: Ports
+    lab: Lab, settings: FlightSettings, devices: Path, folder: Path, ports: Ports
 ) -> tuple[str, list[str]]:
     """Return module and arguments of the autopilot; its companion is at the cable's far end.
 
@@ -121,15 +104,15 @@ def autopilot(
     line = f"{devices / SERIAL_FAR}:{baud_of(lab)}"
     parameters = str(configuration.path(PARAMETERS))
     vehicle = ["--vehicle", lab.vehicle.source, "--companion", line]
-    if options.px4 is None:
+    if settings.px4 is None:
         place = ["--sim-port", str(ports.simulator_tcp), "--wait", str(AUTOPILOT_WAIT)]
         place += ["--once", "--prefer"]
         return STAND_IN, [*vehicle, "--params", parameters, *place]
     log = folder / PX4_LOG
-    own = ["--px4-dir", str(options.px4.directory), "--log", str(log.absolute())]
+    own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
     own += ["--usb", str(devices / USB), "--instance", str(ports.instance)]
     simulation = str(configuration.path(px4_parameters.SIMULATION))
-    given = list(options.px4_params)
+    given = list(settings.px4_params)
     if lab.magnet.output.magnet == GRIPPER:
         given.insert(0, gripper_parameter(lab.magnet.output.magnet_output))
     own += [word for text in given for word in ("--param", text)]

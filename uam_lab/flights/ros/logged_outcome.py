@@ -18,35 +18,44 @@ def read_outcome(
     interrupted: bool,
 ) -> Outcome:
     """Return the outcome of the flight in `folder`; failure: the failed node, if any."""
-    outcome = Outcome(series=None, interrupted=interrupted)
+    logs, notes = folder.path / "logs", []
+    numbers = statistics(logs / "mujoco_sim.json")
+    realtime = settings.clock == "realtime"
+    late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+    if late and realtime:
+        notes.append(f"{late} of {total} setpoints were more than one control period late")
+    outcome = logged(settings, folder, failure, interrupted, notes)
+    if not outcome.errors_of:  # in simulation
+        outcome.wall_s = numbers.get("wall_s", 0.0)
+        if realtime:
+            outcome.latency_s = numbers.get("latency_s", [])
+            outcome.missed_ticks = numbers.get("missed_ticks")
+    if outcome.series is None or outcome.done or outcome.partial:
+        return outcome
+    full = statistics(logs / RECORDER).get("ended")
+    ended = full or numbers.get("ended_by")
+    if settings.dry_run and ended and not full:
+        outcome.abort_reason = f"dry run, {ended}: nothing was armed"
+    else:
+        outcome.failure = ended or "the log has no end of the mission"
+    return outcome
+
+
+def logged(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+    notes: list[str],
+) -> Outcome:
+    """Return what the log of a flight has; `notes` and the losses of the nodes come first."""
+    try:
+        outcome = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
+    except (UnreadableLog, OSError) as error:
+        outcome = Outcome(series=None, failure=f"nothing recorded: {error}")
+    outcome.interrupted = interrupted
     if failure is not None and not interrupted:
         outcome.failure, outcome.details = str(failure), failure.last_lines
-    logs = folder.path / "logs"
-    numbers = statistics(logs / "mujoco_sim.json")
-    outcome.wall_s = numbers.get("wall_s", 0.0)
-    if settings.clock == "realtime":
-        outcome.latency_s = numbers.get("latency_s", [])
-        outcome.missed_ticks = numbers.get("missed_ticks")
-        late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
-        if late:
-            outcome.notes.append(
-                f"{late} of {total} setpoints were more than one control period late"
-            )
-    outcome.notes.extend(losses(logs))
-    try:
-        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
-    except (UnreadableLog, OSError) as error:
-        outcome.failure = outcome.failure or f"nothing recorded: {error}"
-        return outcome
-    flight.tell(outcome)
-    if flight.errors_of:
-        outcome.errors_of, outcome.wall_s = flight.errors_of, flight.wall_s
-        outcome.latency_s, outcome.missed_ticks = flight.latency_s, flight.missed
-    if not flight.done and not outcome.partial:
-        full = statistics(logs / RECORDER).get("ended")
-        ended = full or numbers.get("ended_by")
-        if settings.dry_run and ended and not full:
-            outcome.abort_reason = f"dry run, {ended}: nothing was armed"
-        else:
-            outcome.failure = ended or "the log has no end of the mission"
+    every = [*notes, *losses(folder.path / "logs"), *outcome.notes]
+    outcome.notes = list(dict.fromkeys(every))
     return outcome

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -35,7 +34,6 @@ from uam_lab.records.results.timeseries import (
     SUBSYSTEMS,
     Columns,
     FlightTable,
-    Series,
     gain_columns,
 )
 from uam_msgs_py.messages import topics
@@ -89,43 +87,16 @@ class References:
             rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
 
 
-@dataclass(frozen=True)
-class LoggedFlight:
-    """Content of a log. series: table of the ticks; done: the mission ended; abort_reason: of the
-    mission; parameter_changes, transitions, grasps, faults: in order; wall_s: wall time [s];
-    errors_of: ESTIMATE where the log has no truth, else ""; latency_s (m,), missed: of a log
-    without truth, see `latencies`; notes: lines for the report."""
-
-    series: Series
-    done: bool
-    abort_reason: str
-    parameter_changes: list[dict[str, Any]]
-    transitions: list[dict[str, Any]]
-    grasps: list[dict[str, Any]]
-    faults: list[dict[str, Any]]
-    wall_s: float
-    notes: list[str]
-    errors_of: str = ""
-    latency_s: list[float] | None = None
-    missed: int | None = None
-
-    def tell(self, outcome: Outcome) -> None:
-        """Write table, events and notes to `outcome`; a note that it already has stays once."""
-        outcome.series, outcome.abort_reason = self.series, self.abort_reason
-        outcome.parameter_changes, outcome.transitions = self.parameter_changes, self.transitions
-        outcome.grasps, outcome.faults = self.grasps, self.faults
-        outcome.notes.extend(note for note in self.notes if note not in outcome.notes)
-
-
 def read_flight(
     path: Path,
     scenario: Scenario,
     info: Mapping[str, Any] | None = None,
     vehicle: VehicleDescription | None = None,
-) -> LoggedFlight:
-    """Return the flight of `scenario` recorded in `path`.
+) -> Outcome:
+    """Return the outcome of the flight of `scenario` recorded in `path`: what the log has of it.
 
-    vehicle: of a log without the simulator's topics, None for the default one. Raises UnreadableLog
+    vehicle: of a log without the simulator's topics, None for the default one; latencies are of
+    such a log only. Raises UnreadableLog
     if the file is no log or its flight did not start.
     """
     log = Log.read(path)
@@ -186,19 +157,23 @@ def read_flight(
             name, len(recording.phase_names)
         )
     recording.count = len(ticks)
-    changes = parameter_changes(log, takeoff)
-    entered = transitions(statuses, takeoff)
-    wall = log.wall_seconds(states)
     faults = fault_log.records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
-    series = recording.series(info)
-    decided = grasps(statuses, takeoff)
-    ended = end is not None
-    events = changes, entered, decided, faults
-    found = LoggedFlight(series, ended, abort_reason, *events, wall, [*log.notes, *notes])
-    if simulated:
-        return found
-    latency, missed = latencies(log, vehicle.control_period, ticks)
-    return replace(found, errors_of=ESTIMATE, latency_s=latency.tolist(), missed=missed)
+    outcome = Outcome(
+        series=recording.series(info),
+        wall_s=log.wall_seconds(states),
+        abort_reason=abort_reason,
+        parameter_changes=parameter_changes(log, takeoff),
+        transitions=transitions(statuses, takeoff),
+        grasps=grasps(statuses, takeoff),
+        faults=faults,
+        done=end is not None,
+        notes=[*log.notes, *notes],  # the last: what is read above adds some
+    )
+    if not simulated:
+        latency, missed = latencies(log, vehicle.control_period, ticks)
+        outcome.errors_of = ESTIMATE
+        outcome.latency_s, outcome.missed_ticks = latency.tolist(), missed
+    return outcome
 
 
 def withheld(log: Log, ticks: np.ndarray, states: np.ndarray, references: np.ndarray) -> np.ndarray:

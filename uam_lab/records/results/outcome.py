@@ -48,7 +48,7 @@ class Outcome:
     line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
     parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
     grasps: see `grasp_decision`; faults: see `faults.timeline.record`. errors_of: "" for errors
-    truth − reference, else what stands for the truth.
+    truth − reference, else what stands for the truth. done: whether a log has the mission's end.
     """
 
     series: Series | None
@@ -65,6 +65,7 @@ class Outcome:
     grasps: list[dict[str, Any]] = field(default_factory=list)
     faults: list[dict[str, Any]] = field(default_factory=list)
     errors_of: str = ""
+    done: bool = False
 
     @property
     def partial(self) -> bool:
