@@ -47,7 +47,7 @@ def share_needed(trial: Trial) -> float:
             plant.effects.bench.lift[:] = 1.0
             for name in SLOW:
                 if name in effects:
-                    effects[name].STEPS["tick"](effects[name].arrays)
+                    effects[name].steps["tick"](effects[name].arrays)
             now += described.control_period
         full = rotors.efficiency * rotors.constants[1] * plant.effects.bench.lift
         largest = max(largest, float(np.max(needed / full)))

@@ -52,7 +52,7 @@ def tick(one, name):
     """Let one effect act before a control period."""
     acting = one.effects.acting[name]
     one.effects.draw()
-    acting.STEPS["tick"](acting.arrays)
+    acting.steps["tick"](acting.arrays)
 
 
 def column(samples, kind):
@@ -330,7 +330,7 @@ def test_a_joint_with_play_swings_freely_within_it():
     for _ in range(250):
         one.sense()
         one.step(np.zeros(4), np.array([0.0, 0.0]), False)
-    motors = one.effects.acting["joint_gear"].motors
+    motors = one.effects.acting["joint_gear"].arrays[0]
     gap = np.abs(motors.angle - one.truth().state[0, 6:])
     assert np.all(gap <= math.radians(1.0) + 0.01)
 
@@ -529,7 +529,7 @@ def test_an_odometry_drifts_and_jumps_as_often_as_said():
     acting, drift = one.effects.acting["odometry_drift"], []
     for _ in range(2400):  # 20 s at 120 Hz
         one.effects.draw()
-        acting.STEPS["pose"](acting.arrays)
+        acting.steps["pose"](acting.arrays)
         drift.append(acting.arrays.frame[:3].copy())
     ways = np.linalg.norm(np.diff(drift, axis=0), axis=1)
     assert 8 <= np.count_nonzero(ways) <= 30 and ways[ways > 0.0] == pytest.approx(0.3)
@@ -537,7 +537,7 @@ def test_an_odometry_drifts_and_jumps_as_often_as_said():
     acting, drift = one.effects.acting["odometry_drift"], []
     for _ in range(12000):
         one.effects.draw()
-        acting.STEPS["pose"](acting.arrays)
+        acting.steps["pose"](acting.arrays)
         drift.append(acting.arrays.frame[:3].copy())
     seconds = np.diff(drift[::120], axis=0)
     assert np.std(seconds) == pytest.approx(0.1, rel=0.2)

@@ -56,7 +56,7 @@ class ActingEffects:
                     self.acting[name] = one
         self._noises = [noise for one in self.acting.values() for noise in one.noises]
         hooks = {name: self._hooks(name) for name in HOOKS}
-        self.compiled = all(one.STEPS for one in self.acting.values())
+        self.compiled = all(one.steps for one in self.acting.values())
         self._kept = hooks
         tables = (table(hooks[name]) for name in HOOKS)
         factor = bench.rotors.efficiency.copy()
@@ -65,9 +65,9 @@ class ActingEffects:
     def _hooks(self, name: str) -> list[Hook]:
         found = []
         for one in self.acting.values():
-            if name in one.STEPS:
-                found.append(compiled_hook(one.STEPS[name], one.arrays))
-            elif not one.STEPS and (function := self._in_python(one, name)):
+            if name in one.steps:
+                found.append(compiled_hook(one.steps[name], one.arrays))
+            elif not one.steps and (function := self._in_python(one, name)):
                 found.append(python_hook(self._safe(function)))
         return found
 

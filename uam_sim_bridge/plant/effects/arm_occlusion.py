@@ -18,7 +18,7 @@ from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.memory import put
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 from uam_sim_bridge.plant.arm_geometry import tip_of
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.vehicle import PAYLOAD
 
 DECK = (0.0, 0.0, 0.08)  # [m, FLU] marker on the top deck
@@ -47,7 +47,17 @@ class ArmOcclusion(Effect):
         cameras = np.column_stack([self.ring * np.cos(angles), self.ring * np.sin(angles), heights])
         markers = np.vstack([bench.positions, DECK])
         errors = self.marker_error * noise.standard_normal(markers.shape)
-        return _Occlusion(bench, cameras, markers, errors - errors.mean(axis=0), self.thickness)
+        model, data = bench.model, bench.data
+        chain = model.jnt_bodyid[model.dof_jntid[bench.arm_dofs]].astype(np.int64)
+        payload = data.xpos[model.body(PAYLOAD).id]
+        arrays = OcclusionArrays(
+            *(bench.pose, bench.memory, bench.base_position, bench.base_axes),
+            *(markers, cameras, errors - errors.mean(axis=0)),
+            *(data.xpos, chain, tip_of(model, data, chain[-1]), payload),
+            *(np.zeros((len(chain) + 2, 3)), np.zeros(len(markers), dtype=np.bool_)),
+            self.thickness,
+        )
+        return Compiled(arrays, pose=hide)
 
 
 @jit
@@ -167,27 +177,3 @@ def shift_pose(
             pose[1 + i] += axes[3 * i + k] * shift[k]
     turn = quaternion_from_rotation_vector(moment / spread)
     pose[4:] = quaternion_multiply(pose[4:], turn)
-
-
-class _Occlusion(Acting):
-    STEPS: ClassVar = {"pose": hide}
-
-    def __init__(
-        self,
-        bench: Bench,
-        cameras: np.ndarray,
-        markers: np.ndarray,
-        errors: np.ndarray,
-        thickness: float,
-    ) -> None:
-        model, data = bench.model, bench.data
-        joints = model.dof_jntid[bench.arm_dofs]
-        chain, payload = (
-            model.jnt_bodyid[joints].astype(np.int64),
-            data.xpos[model.body(PAYLOAD).id],
-        )
-        self.arrays = OcclusionArrays(
-            *(bench.pose, bench.memory, bench.base_position, bench.base_axes),
-            *(markers, cameras, errors, data.xpos, chain, tip_of(model, data, chain[-1]), payload),
-            *(np.zeros((len(chain) + 2, 3)), np.zeros(len(markers), dtype=np.bool_), thickness),
-        )

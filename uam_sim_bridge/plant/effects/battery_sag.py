@@ -15,7 +15,7 @@ import numpy as np
 
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import record
-from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Compiled, Effect, size
 
 SMOOTHING = 0.1  # [s] of the current: the voltage follows the load after capacitors and ESCs
 
@@ -39,7 +39,21 @@ class BatterySag(Effect):
     start: float = size("state of charge at the start, the least", "1", 0.1, 1.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Battery(self, bench, noise.uniform(self.start, 1.0))
+        charge, area = (
+            noise.uniform(self.start, 1.0),
+            math.pi * bench.vehicle.description.rotor.radius**2,
+        )
+        names = "charge current cells full empty_cell resistance electronics capacity"
+        numbers = record("", f"{names} nominal per_thrust gain period")
+        numbers[0] = (
+            *(charge, 0.0, self.cells, self.full, self.empty),
+            *(self.resistance, self.electronics, self.capacity),
+            bench.rotors.constants[1],
+            1.0 / (self.figure_of_merit * math.sqrt(2.0 * AIR * area)),
+            *(1.0 - math.exp(-bench.period / SMOOTHING), bench.period),
+        )
+        arrays = BatteryArrays(bench.rotors.thrust, bench.rotors.constants, numbers)
+        return Compiled(arrays, tick=discharge)
 
 
 class BatteryArrays(NamedTuple):
@@ -64,19 +78,3 @@ def discharge(a: BatteryArrays) -> int:
     m.charge = max(0.0, m.charge - m.current * m.period / (3600.0 * m.capacity))
     a.constants[1] = m.nominal * (voltage / (m.cells * m.full)) ** 2
     return 0
-
-
-class _Battery(Acting):
-    STEPS: ClassVar = {"tick": discharge}
-
-    def __init__(self, p: BatterySag, bench: Bench, charge: float) -> None:
-        area = math.pi * bench.vehicle.description.rotor.radius**2
-        names = "charge current cells full empty_cell resistance electronics capacity"
-        numbers = record("", f"{names} nominal per_thrust gain period")
-        numbers[0] = (
-            *(charge, 0.0, p.cells, p.full, p.empty, p.resistance, p.electronics, p.capacity),
-            bench.rotors.constants[1],
-            1.0 / (p.figure_of_merit * math.sqrt(2.0 * AIR * area)),
-            *(1.0 - math.exp(-bench.period / SMOOTHING), bench.period),
-        )
-        self.arrays = BatteryArrays(bench.rotors.thrust, bench.rotors.constants, numbers)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 
 
 class CableTorque(Effect):
@@ -27,7 +27,8 @@ class CableTorque(Effect):
         drawn = noise.standard_normal((2, joints))
         stiffness = self.stiffness * np.abs(1.0 + self.stiffness_spread * drawn[0])
         rest = bench.vehicle.description.stowed + np.radians(self.rest_spread_deg) * drawn[1]
-        return _CableTorque(bench, stiffness, rest)
+        torque = bench.data.qfrc_applied[bench.arm_dofs]
+        return Compiled((torque, bench.angles, stiffness, rest), tick=pull)
 
 
 @borrowing
@@ -37,10 +38,3 @@ def pull(a: tuple) -> int:
     for i in range(len(torque)):
         torque[i] = stiffness[i] * (rest[i] - angles[i])
     return 0
-
-
-class _CableTorque(Acting):
-    STEPS: ClassVar = {"tick": pull}
-
-    def __init__(self, bench: Bench, stiffness: np.ndarray, rest: np.ndarray) -> None:
-        self.arrays = bench.data.qfrc_applied[bench.arm_dofs], bench.angles, stiffness, rest

@@ -19,7 +19,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
-from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 from uam_sim_bridge.plant.vehicle import PAYLOAD
 
@@ -41,7 +41,17 @@ class Downwash(Effect):
     turbulence: float = size("standard deviation / mean of the velocity", "1", 0.0, 0.5)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Downwash(self, bench, noise)
+        body, edges = bench.model.body(PAYLOAD).id, 2.0 * bench.model.geom(PAYLOAD).size
+        keep = math.exp(-bench.period / EDDY)
+        eddies = Noise(noise, np.array([self.turbulence * math.sqrt(1.0 - keep * keep)]))
+        arrays = DownwashArrays(
+            *(bench.data.xpos[body], bench.data.xfrc_applied[body, 0:3], np.zeros(3)),
+            *(bench.base_position, bench.base_axes, bench.positions, bench.rotors.thrust),
+            *(eddies.arrays, np.zeros(1)),
+            *(bench.vehicle.description.rotor.radius, self.spreading, keep),
+            0.5 * AIR * self.drag * float(edges[0] * edges[1]),
+        )
+        return Compiled(arrays, [eddies], tick=push)
 
 
 @jit
@@ -106,20 +116,3 @@ def push(a: DownwashArrays) -> int:
     for i in range(3):
         a.force[i] = -force * a.axes[3 * i + 2] if force >= STILL else 0.0
     return 0
-
-
-class _Downwash(Acting):
-    STEPS: ClassVar = {"tick": push}
-
-    def __init__(self, p: Downwash, bench: Bench, noise: np.random.Generator) -> None:
-        body, edges = bench.model.body(PAYLOAD).id, 2.0 * bench.model.geom(PAYLOAD).size
-        keep = math.exp(-bench.period / EDDY)
-        eddies = Noise(noise, np.array([p.turbulence * math.sqrt(1.0 - keep * keep)]))
-        self.noises = (eddies,)
-        self.arrays = DownwashArrays(
-            *(bench.data.xpos[body], bench.data.xfrc_applied[body, 0:3], np.zeros(3)),
-            *(bench.base_position, bench.base_axes, bench.positions, bench.rotors.thrust),
-            *(eddies.arrays, np.zeros(1)),
-            *(bench.vehicle.description.rotor.radius, p.spreading, keep),
-            0.5 * AIR * p.drag * float(edges[0] * edges[1]),
-        )

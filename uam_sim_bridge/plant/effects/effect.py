@@ -103,15 +103,10 @@ class Bench:
 
 
 class Acting:
-    """An effect in a flight, compiled or in Python.
+    """An effect in a flight; a subclass in Python implements some of the methods. `steps`: see
+    `Compiled`; noises: of which a tick or a pose uses at most one row each."""
 
-    STEPS: compiled functions of the one tuple `arrays`, which return 0, by the names of HOOKS;
-    noises: of which a tick or a pose uses at most one row each. In Python a subclass implements
-    some of the methods instead.
-    """
-
-    STEPS: ClassVar[Mapping[str, Callable[[tuple], int]]] = {}
-    arrays: tuple = ()
+    steps: Mapping[str, Callable[[tuple], int]] = {}
     noises: Sequence[Noise] = ()
 
     def tick(self) -> None:
@@ -132,6 +127,16 @@ class Acting:
     def lateness(self) -> float:
         """Return the delay [s] that the effect adds to the pose of this tick."""
         return 0.0
+
+
+class Compiled(Acting):
+    """An effect whose steps are compiled functions of one tuple, by the names of HOOKS."""
+
+    def __init__(
+        self, arrays: tuple, noises: Sequence[Noise] = (), **steps: Callable[[tuple], int]
+    ) -> None:
+        """steps: return 0."""
+        self.arrays, self.noises, self.steps = arrays, noises, steps
 
 
 # tick: before the physics of a control period; joints: at each physics step, changes

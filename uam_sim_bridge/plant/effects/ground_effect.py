@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 
 LOWEST = 0.5  # [1] of the radius: the formula is not valid below
 
@@ -40,7 +40,8 @@ class GroundEffect(Effect):
         radius = bench.vehicle.description.rotor.radius
         near = float(np.where(apart > 0.0, apart, np.inf).min())
         shape = np.array([radius, near, float(apart.max()), self.fountain, self.strength])
-        return _GroundEffect(bench, shape)
+        arrays = bench.base_position, bench.base_axes, positions, shape, bench.lift
+        return Compiled(arrays, tick=lift)
 
 
 @borrowing
@@ -80,10 +81,3 @@ def lift(a: tuple) -> int:
     """Do `raise_thrust` with the arguments `a`."""
     raise_thrust(a[0], a[1], a[2], a[3], a[4])
     return 0
-
-
-class _GroundEffect(Acting):
-    STEPS: ClassVar = {"tick": lift}
-
-    def __init__(self, bench: Bench, shape: np.ndarray) -> None:
-        self.arrays = bench.base_position, bench.base_axes, bench.positions, shape, bench.lift

@@ -26,7 +26,7 @@ import numpy as np
 
 from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import ParameterError
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, each, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, each, size
 
 LINK_ARMATURE = 5e-4  # [kg m^2] left on the link: output shaft and horn
 
@@ -55,7 +55,27 @@ class JointGear(Effect):
     width: float = size("w, speed of smooth friction, 0: dry; a rigid gear has one", "rad/s", 0, 1)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Gear(self, bench)
+        model, dofs, count = bench.model, bench.arm_dofs, bench.arm[1]
+        coulomb = model.dof_frictionloss[dofs].copy()
+        if self.coulomb:
+            coulomb = bench.for_each("joint_gear: coulomb", self.coulomb, count, "joints")
+        constants = (
+            *(0.5 * math.radians(self.backlash_deg), self.stiffness, self.damping, self.stiction),
+            *(self.stribeck_speed, self.width, model.opt.timestep),
+        )
+        motors = Gear(
+            model.dof_armature[dofs].copy(),
+            coulomb,
+            bench.for_each("joint_gear: load", self.load, count, "joints"),
+            np.array(constants),
+            bench.angles.copy(),
+            np.zeros(count),
+        )
+        model.dof_frictionloss[dofs] = 0.0
+        if self.stiffness:
+            model.dof_armature[dofs] = LINK_ARMATURE
+        arrays = motors, bench.angles, bench.data.qvel[dofs], bench.torque_control
+        return Compiled(arrays, joints=act)
 
     def check_together(self) -> None:
         if self.stiffness == self.width == 0.0:
@@ -135,29 +155,3 @@ def gear_step(
         speed[i] = (free + braked(gear, i, torque[i], speed[i], free)) / gear.inertia[i]
         angle[i] += step * speed[i]
         output[i] = contact
-
-
-class _Gear(Acting):
-    """`motors`: see `Gear`."""
-
-    STEPS: ClassVar = {"joints": act}
-
-    def __init__(self, p: JointGear, bench: Bench) -> None:
-        model, dofs, count = bench.model, bench.arm_dofs, bench.arm[1]
-        half, step = 0.5 * math.radians(p.backlash_deg), model.opt.timestep
-        constants = half, p.stiffness, p.damping, p.stiction, p.stribeck_speed, p.width, step
-        coulomb = model.dof_frictionloss[dofs].copy()
-        if p.coulomb:
-            coulomb = bench.for_each("joint_gear: coulomb", p.coulomb, count, "joints")
-        self.motors = Gear(
-            model.dof_armature[dofs].copy(),
-            coulomb,
-            bench.for_each("joint_gear: load", p.load, count, "joints"),
-            np.array(constants),
-            bench.angles.copy(),
-            np.zeros(count),
-        )
-        self.arrays = self.motors, bench.angles, bench.data.qvel[dofs], bench.torque_control
-        model.dof_frictionloss[dofs] = 0.0
-        if p.stiffness:
-            model.dof_armature[dofs] = LINK_ARMATURE

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 
 
 class JointReadings(Effect):
@@ -23,7 +23,11 @@ class JointReadings(Effect):
     counts: float = size("counts of the encoder per turn", "1", 64.0, 1048576.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Readings(self, bench)
+        n, ticks = bench.arm[1], round(self.delay / bench.period)
+        bench.encoder_units[:] = 2.0 * np.pi / self.counts, self.speed_unit
+        speeds = bench.sample[6 + n : 6 + 2 * n]
+        arrays = SpeedArrays(speeds, np.zeros((ticks + 1, n)), np.zeros(1, dtype=np.int64))
+        return Compiled(arrays, sample=hold_back)
 
 
 class SpeedArrays(NamedTuple):
@@ -45,13 +49,3 @@ def hold_back(a: SpeedArrays) -> int:
         a.speeds[i] = a.earlier[following, i]
     a.next[0] = following
     return 0
-
-
-class _Readings(Acting):
-    STEPS: ClassVar = {"sample": hold_back}
-
-    def __init__(self, p: JointReadings, bench: Bench) -> None:
-        n, ticks = bench.arm[1], round(p.delay / bench.period)
-        bench.encoder_units[:] = 2.0 * np.pi / p.counts, p.speed_unit
-        speeds = bench.sample[6 + n : 6 + 2 * n]
-        self.arrays = SpeedArrays(speeds, np.zeros((ticks + 1, n)), np.zeros(1, dtype=np.int64))

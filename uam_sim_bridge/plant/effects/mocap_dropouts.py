@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
@@ -25,7 +25,18 @@ class MocapDropouts(Effect):
     longest: float = size("longest burst", "s", 0.0, 2.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Dropouts(self, bench, noise)
+        shares, lengths = noise.spawn(2)
+        noises = (
+            Noise(shares, np.ones(2), "random"),
+            Noise(lengths, np.array([self.burst_time]), "standard_exponential"),
+        )
+        arrays = DropoutArrays(
+            bench.pose,
+            *(one.arrays for one in noises),
+            *(bench.memory, np.full(1, -1.0)),
+            *(self.share, self.bursts * bench.mocap.period, self.longest),
+        )
+        return Compiled(arrays, noises, pose=drop)
 
 
 class DropoutArrays(NamedTuple):
@@ -54,20 +65,3 @@ def drop(a: DropoutArrays) -> int:
     if in_burst or drawn[0] < a.share:
         a.status[0].lost = 1
     return 0
-
-
-class _Dropouts(Acting):
-    STEPS: ClassVar = {"pose": drop}
-
-    def __init__(self, p: MocapDropouts, bench: Bench, noise: np.random.Generator) -> None:
-        shares, lengths = noise.spawn(2)
-        self.noises = (
-            Noise(shares, np.ones(2), "random"),
-            Noise(lengths, np.array([p.burst_time]), "standard_exponential"),
-        )
-        self.arrays = DropoutArrays(
-            bench.pose,
-            *(one.arrays for one in self.noises),
-            *(bench.memory, np.full(1, -1.0)),
-            *(p.share, p.bursts * bench.mocap.period, p.longest),
-        )

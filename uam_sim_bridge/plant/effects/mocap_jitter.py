@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
@@ -26,7 +26,12 @@ class MocapJitter(Effect):
     wander_time: float = size("its correlation time", "s", 0.01, 1000.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Jitter(self, bench, noise)
+        keep = math.exp(-bench.mocap.period / self.wander_time)
+        error = self.wander * noise.standard_normal(3)
+        step = self.wander * math.sqrt(1.0 - keep * keep)
+        drawn = Noise(noise, np.array([step, step, step, self.stamp]))
+        arrays = JitterArrays(bench.pose, drawn.arrays, error, np.full(1, -np.inf), keep)
+        return Compiled(arrays, [drawn], pose=jitter)
 
 
 class JitterArrays(NamedTuple):
@@ -50,15 +55,3 @@ def jitter(a: JitterArrays) -> int:
     a.pose[0] = max(0.0, a.pose[0] + drawn[3], a.last[0] + 1e-6)
     a.last[0] = a.pose[0]
     return 0
-
-
-class _Jitter(Acting):
-    STEPS: ClassVar = {"pose": jitter}
-
-    def __init__(self, p: MocapJitter, bench: Bench, noise: np.random.Generator) -> None:
-        keep = math.exp(-bench.mocap.period / p.wander_time)
-        error = p.wander * noise.standard_normal(3)
-        step = p.wander * math.sqrt(1.0 - keep * keep)
-        self.noises = (Noise(noise, np.array([step, step, step, p.stamp])),)
-        last = np.full(1, -np.inf)
-        self.arrays = JitterArrays(bench.pose, self.noises[0].arrays, error, last, keep)

@@ -18,7 +18,7 @@ from uam_control.maths.compiled import borrowing
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import record
 from uam_control.settings.json_text import read_mapping
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
@@ -37,7 +37,9 @@ class NetworkDelay(Effect):
     longest: float = size("longest added delay of both", "s", 0.0, 0.5)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _PoseDelay(self, bench, noise)
+        added = Noise(noise, np.array([self.mocap_jitter]), "standard_exponential")
+        arrays = bench.memory, added.arrays, self.mocap, self.longest
+        return Compiled(arrays, [added], pose=delay)
 
 
 @borrowing
@@ -46,14 +48,6 @@ def delay(a: tuple) -> int:
     status, added, fixed, longest = a
     status[0].late += fixed + min(longest, added.rows[next_row(added), 0])
     return 0
-
-
-class _PoseDelay(Acting):
-    STEPS: ClassVar = {"pose": delay}
-
-    def __init__(self, p: NetworkDelay, bench: Bench, noise: np.random.Generator) -> None:
-        self.noises = (Noise(noise, np.array([p.mocap_jitter]), "standard_exponential"),)
-        self.arrays = bench.memory, self.noises[0].arrays, p.mocap, p.longest
 
 
 class DelayArrays(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from uam_control.estimation.pose_anchor import PLACE, YAW, moved
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
@@ -34,7 +34,19 @@ class OdometryDrift(Effect):
     jump_turn: float = size("turn of a jump", "rad", 0.0, 0.3)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Drift(self, bench, noise)
+        walk, jumps, directions = noise.spawn(3)
+        part = math.sqrt(bench.mocap.period)
+        noises = (
+            Noise(walk, part * np.array([self.walk, self.walk, self.walk, self.turn])),
+            Noise(jumps, np.ones(1), "random"),
+            Noise(directions, np.ones(PLACE)),
+        )
+        arrays = DriftArrays(
+            bench.pose,
+            *(one.arrays for one in noises),
+            *(np.zeros(PLACE), self.jumps * bench.mocap.period, self.jump, self.jump_turn),
+        )
+        return Compiled(arrays, noises, pose=drift)
 
 
 class DriftArrays(NamedTuple):
@@ -83,21 +95,3 @@ def jump(frame: np.ndarray, direction: np.ndarray, distance: float, turn: float)
     move = distance / length * direction[:YAW]
     frame[:YAW] += -move if np.sum(frame[:YAW] * move) > 0.0 else move
     frame[YAW] -= math.copysign(turn, frame[YAW])
-
-
-class _Drift(Acting):
-    STEPS: ClassVar = {"pose": drift}
-
-    def __init__(self, p: OdometryDrift, bench: Bench, noise: np.random.Generator) -> None:
-        walk, jumps, directions = noise.spawn(3)
-        part = math.sqrt(bench.mocap.period)
-        self.noises = (
-            Noise(walk, part * np.array([p.walk, p.walk, p.walk, p.turn])),
-            Noise(jumps, np.ones(1), "random"),
-            Noise(directions, np.ones(PLACE)),
-        )
-        self.arrays = DriftArrays(
-            bench.pose,
-            *(one.arrays for one in self.noises),
-            *(np.zeros(PLACE), p.jumps * bench.mocap.period, p.jump, p.jump_turn),
-        )

@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.vehicle import BASE
 
 BLADES = 2
@@ -34,10 +34,18 @@ class PropellerVibration(Effect):
     frame_gain: float = size("resonance of the frame, factor on both", "1", 0.0, 50.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        rotors = len(bench.positions)
+        rotors, model = len(bench.positions), bench.model
         spread = self.imbalance * np.abs(1.0 + 0.3 * noise.standard_normal(rotors))
-        phases = noise.uniform(0.0, 2.0 * math.pi, rotors)
-        return _Vibration(self, bench, spread, phases)
+        phases, base = noise.uniform(0.0, 2.0 * math.pi, rotors), model.body(BASE).id
+        arrays = Shaken(
+            *(bench.sample, bench.rotors.speed, bench.directions, bench.positions),
+            *(phases, spread),
+            self.blade_passing * bench.vehicle.description.rotor.thrust_coefficient,
+            self.frame_gain / float(model.body_subtreemass[base]),
+            self.frame_gain / model.body_inertia[base],
+            bench.period,
+        )
+        return Compiled(arrays, sample=vibrate)
 
 
 class Shaken(NamedTuple):
@@ -97,24 +105,3 @@ def vibrate(a: Shaken) -> int:
         sample[2] += inertia[2] * (x * gy - y * gx)
         a.phases[i] = (a.phases[i] + angle) % (2.0 * math.pi)
     return 0
-
-
-class _Vibration(Acting):
-    STEPS: ClassVar = {"sample": vibrate}
-
-    def __init__(
-        self, p: PropellerVibration, bench: Bench, imbalance: np.ndarray, phases: np.ndarray
-    ) -> None:
-        model, base = bench.model, bench.model.body(BASE).id
-        self.arrays = Shaken(
-            bench.sample,
-            bench.rotors.speed,
-            bench.directions,
-            bench.positions,
-            phases,
-            imbalance,
-            p.blade_passing * bench.vehicle.description.rotor.thrust_coefficient,
-            p.frame_gain / float(model.body_subtreemass[base]),
-            p.frame_gain / model.body_inertia[base],
-            bench.period,
-        )

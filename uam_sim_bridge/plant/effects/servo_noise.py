@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, each, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, each, size
 from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 
 
@@ -30,7 +30,11 @@ class ServoNoise(Effect):
     bandwidth: float = size("of the noise", "Hz", 0.1, 100.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Noise(self, bench, noise)
+        count, keep = bench.arm[1], math.exp(-2.0 * math.pi * self.bandwidth * bench.period)
+        sizes = bench.for_each("servo_noise: torque", self.torque, count, "joints")
+        white = Noise(noise, math.sqrt(1.0 - keep * keep) * sizes)
+        arrays = TorqueNoise(bench.torque_control, white.arrays, np.zeros(count), keep)
+        return Compiled(arrays, [white], tick=renew, joints=add)
 
 
 class TorqueNoise(NamedTuple):
@@ -58,14 +62,3 @@ def add(a: TorqueNoise) -> int:
     for i in range(len(a.noise)):
         a.torque[i] += a.noise[i]
     return 0
-
-
-class _Noise(Acting):
-    STEPS: ClassVar = {"tick": renew, "joints": add}
-
-    def __init__(self, p: ServoNoise, bench: Bench, noise: np.random.Generator) -> None:
-        count, keep = bench.arm[1], math.exp(-2.0 * math.pi * p.bandwidth * bench.period)
-        sizes = bench.for_each("servo_noise: torque", p.torque, count, "joints")
-        self.noises = (Noise(noise, math.sqrt(1.0 - keep * keep) * sizes),)
-        state = np.zeros(count)
-        self.arrays = TorqueNoise(bench.torque_control, self.noises[0].arrays, state, keep)

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, several, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, several, size
 from uam_sim_bridge.plant.vehicle import BASE
 
 
@@ -24,7 +24,9 @@ class StandingLoad(Effect):
     turning: float = size("1: both turn with the body (FLU), 0: they do not (ENU)", "1", 0.0, 1.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Load(self, bench)
+        applied = bench.data.xfrc_applied[bench.model.body(BASE).id]
+        load = np.array([self.force, self.torque])
+        return Compiled(LoadArrays(applied, bench.base_axes, load, self.turning), tick=press)
 
 
 class LoadArrays(NamedTuple):
@@ -48,12 +50,3 @@ def press(a: LoadArrays) -> int:
                 value += a.turning * a.axes[3 * i + k] * a.load[kind, k]
             a.applied[3 * kind + i] += value
     return 0
-
-
-class _Load(Acting):
-    STEPS: ClassVar = {"tick": press}
-
-    def __init__(self, p: StandingLoad, bench: Bench) -> None:
-        applied = bench.data.xfrc_applied[bench.model.body(BASE).id]
-        load = np.array([p.force, p.torque])
-        self.arrays = LoadArrays(applied, bench.base_axes, load, p.turning)

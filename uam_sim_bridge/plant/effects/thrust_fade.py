@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 
 LEAST = 0.3  # [1] part of the thrust that is left at the end
 
@@ -22,7 +22,10 @@ class ThrustFade(Effect):
     per_minute: float = size("part of the thrust that is lost in a minute", "1/min", 0.0, 0.5)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        return _Fade(self.per_minute, bench)
+        described = bench.vehicle.description
+        weight, loss = described.mass * described.gravity, self.per_minute / 60.0 * bench.period
+        arrays = FadeArrays(bench.rotors.thrust, bench.lift, np.ones(1), weight, loss)
+        return Compiled(arrays, tick=fade)
 
 
 class FadeArrays(NamedTuple):
@@ -47,12 +50,3 @@ def fade(a: FadeArrays) -> int:
     for i in range(len(a.lift)):
         a.lift[i] *= a.part[0]
     return 0
-
-
-class _Fade(Acting):
-    STEPS: ClassVar = {"tick": fade}
-
-    def __init__(self, per_minute: float, bench: Bench) -> None:
-        described = bench.vehicle.description
-        weight, loss = described.mass * described.gravity, per_minute / 60.0 * bench.period
-        self.arrays = FadeArrays(bench.rotors.thrust, bench.lift, np.ones(1), weight, loss)
