@@ -106,8 +106,9 @@ class FeasibilityLimits(ParameterSet):
         1e4,
     )
     reference_delay: float = number(
-        0.0,
-        "delay of the setpoints with which references are checked: that much may begin in flight",
+        0.012,
+        "delay of the setpoints with which references are checked: every flight has two ticks of "
+        "it, and more may begin in flight",
         "s",
         0.0,
         1.0,

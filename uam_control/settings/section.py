@@ -117,9 +117,9 @@ class Section:
     @_reader
     def one_of(self, key: str, allowed: Collection[str]) -> str:
         """Return the entry `key`, one of the texts `allowed`."""
-        value = self.text(key)
-        if value not in allowed:
-            raise self.error(key, f"'{value}' is not one of {', '.join(allowed)}")
+        value = self.entry(key)
+        if not isinstance(value, str) or value not in allowed:
+            raise self.error(key, f"{value!r} is not one of {', '.join(allowed)}")
         return value
 
     @_reader

@@ -181,9 +181,8 @@ def _timing(entry: Section, shape: tuple[Harmonic, ...], laps: float) -> tuple[P
     default = max(DEFAULT_RAMP, SMOOTHSTEP * peak / RAMP_ACCELERATION)
     ramp = entry.positive("ramp", default=default)
     if ramp > laps * period:
-        raise entry.error(
-            "laps", f"{laps:g} of {period:.3g} s are shorter than the ramps of {ramp:.3g} s"
-        )
+        shorter = f"{laps:g} of {period:.3g} s are shorter than the ramps of {ramp:.3g} s"
+        raise entry.error("laps", f"{shorter}: more laps, slower ones, or a shorter ramp")
     return curves.steady(laps, period, ramp), ramp
 
 
