@@ -370,6 +370,19 @@ def test_the_arm_gives_way_above_a_stand_when_the_bridge_is_silent(name, age, ga
     assert (output.reference[0, 7] == flight.state[0, 7]) == yields
 
 
+def test_an_arm_away_from_its_reference_stays_where_it_is_when_a_released_vehicle_stands():
+    """A reference that moved back to it from where it was levered the vehicle up, to 26 degrees."""
+    flight = released()
+    flight.authority = Authority("the pilot, in LAND", lands=True)
+    flight.state[1, 2] = -0.7
+    for _ in range(30):
+        flight.step()
+    flight.state[0, 6:], flight.state[1, 2] = (-0.9, -1.0), 0.0  # pushed by the ground
+    for _ in range(300):
+        reference = flight.step().reference
+        assert reference[0, 6:].tolist() == [-0.9, -1.0] and not reference[1:, 6:].any()
+
+
 def test_a_flight_that_the_pilot_lands_is_over():
     flight = released()
     flight.state[0, 2] = START[2]

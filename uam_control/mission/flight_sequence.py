@@ -385,7 +385,10 @@ class FlightSequence:
             self._standing = Standing()
             self._guidance.stop(stamp, stow)
         elif standing.update(float(state[CHI_DOT, Z])):
-            self._guidance.move_arm(stamp, state[CHI, ARM] if standing.value else None)
+            if standing.value:  # where it is now: a way back there would lever, too
+                self._guidance.give_way(stamp, state[CHI, ARM])
+            else:
+                self._guidance.move_arm(stamp)
 
     def _enter(self, stamp: float, before: State, decision: Decision) -> None:
         state, guidance, event = decision.state, self._guidance, self.changes[-1].event
