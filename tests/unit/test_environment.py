@@ -12,7 +12,7 @@ import yaml
 from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
-from uam_lab.flights import arm_on_ground
+from uam_lab.flights import arm_on_ground, clearance
 from uam_sim_bridge.plant import Vehicle
 
 S500 = load_description()
@@ -170,3 +170,15 @@ def test_entries_that_do_not_fit_together_are_refused_by_name(tmp_path, entries,
 
 def test_what_touches_does_not_intersect():
     arm_on_ground.check(S500, load_scenario(str(ROOM), S500))
+
+
+BESIDE = {"kind": "box", "size": [0.2, 0.2, 2.0]}
+
+
+@pytest.mark.parametrize(
+    ("y", "said"),
+    [(0.3, "leads through box"), (0.42, "passes box within 0.0"), (1.5, "")],
+)
+def test_what_the_reference_comes_near_is_a_note(tmp_path, y, said):
+    found = clearance.note(S500, scenario(tmp_path, [BESIDE | {"position": [0.0, y]}]))
+    assert said in found and bool(said) is bool(found)

@@ -27,7 +27,7 @@ from uam_control.vehicle import (
     chain_of,
     load_description,
 )
-from uam_lab.flights import arm_on_ground, node_options, vehicle_changes
+from uam_lab.flights import arm_on_ground, clearance, node_options, vehicle_changes
 from uam_lab.flights.flight_options import (
     AUTOPILOT_IMU,
     BUILTIN,
@@ -203,7 +203,8 @@ def checked(o: FlightOptions) -> FlightSettings:
         + slower
         + misfits(profile)
         + node_options.unread(profile)
-        + _about_the_arm(vehicle, scenario, mass),
+        + _about_the_arm(vehicle, scenario, mass)
+        + tuple(filter(None, [clearance.note(vehicle, scenario)])),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, presets.read(o.plant_preset, o.effects)),
         without=tuple(dict.fromkeys(without if o.view else (*without, COCKPIT))),

@@ -24,6 +24,7 @@ WORLD, VEHICLE_AND_LOAD = 1, 14  # contype, conaffinity: see parts/world.xml
 LOAD, LOAD_WITH = 4, 7
 PLATE = 0.0005  # [m] half thickness of a payload's steel plate
 RIM = 0.004  # [m] of a payload beside its plate
+VEHICLE = "the vehicle"
 Entry = dict[str, Any]
 
 
@@ -167,28 +168,43 @@ BUILDERS: dict[str, Callable[[mujoco.MjsBody, Entry], None]] = {
 }
 
 
+def shapes(model: mujoco.MjModel, entries: Sequence[Entry]) -> dict[str, np.ndarray]:
+    """Return the geoms of each entry and, under VEHICLE, those of the vehicle."""
+    names = {_body_of(entry, entries): entry["name"] for entry in entries} | {BASE: VEHICLE}
+    found: dict[str, list[int]] = {name: [] for name in names.values()}
+    for geom in range(model.ngeom):
+        body = model.geom_bodyid[geom]
+        while body and model.body(body).name not in names:
+            body = model.body_parentid[body]
+        if body:
+            found[names[model.body(body).name]].append(geom)
+    return {name: np.array(geoms, int) for name, geoms in found.items()}
+
+
+def distance(
+    model: mujoco.MjModel, data: mujoco.MjData, ones: np.ndarray, others: np.ndarray, far: float
+) -> float:
+    """Return the smallest distance [m] between geoms of two parts, negative where they intersect;
+    `far` if it is larger."""
+    apart = np.linalg.norm(data.geom_xpos[ones, None] - data.geom_xpos[None, others], axis=2)
+    apart -= model.geom_rbound[ones, None] + model.geom_rbound[None, others]
+    near = zip(*np.nonzero(apart < far), strict=True)
+    pairs = ((int(ones[i]), int(others[j])) for i, j in near)
+    return min(
+        (mujoco.mj_geomDistance(model, data, a, b, far, np.zeros(6)) for a, b in pairs), default=far
+    )
+
+
 def overlapping(
     model: mujoco.MjModel, data: mujoco.MjData, entries: Sequence[Entry], slack: float
 ) -> tuple[str, str, float] | None:
     """Return names and depth [m] of the first two that intersect: two entries, or an entry and the
     vehicle at the pose in `data`; slack [m]: by which they may."""
     mujoco.mj_kinematics(model, data)
-    names = {_body_of(entry, entries): entry["name"] for entry in entries} | {BASE: "the vehicle"}
-    shapes: dict[str, list[int]] = {name: [] for name in names.values()}
-    for geom in range(model.ngeom):
-        body = model.geom_bodyid[geom]
-        while body and model.body(body).name not in names:
-            body = model.body_parentid[body]
-        if body:
-            shapes[names[model.body(body).name]].append(geom)
-    for one, other in itertools.combinations(shapes, 2):
-        pairs = itertools.product(shapes[one], shapes[other])
-        reach = min(
-            (mujoco.mj_geomDistance(model, data, a, b, slack, np.zeros(6)) for a, b in pairs),
-            default=slack,
-        )
+    for one, other in itertools.combinations(shapes(model, entries).items(), 2):
+        reach = distance(model, data, one[1], other[1], slack)
         if reach < -slack:
-            return one, other, -reach
+            return one[0], other[0], -reach
     return None
 
 
