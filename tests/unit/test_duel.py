@@ -12,7 +12,7 @@ from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import load_description
 from uam_lab.experiments.duel import report
-from uam_lab.experiments.duel.flights import DuelResult, load_duel, standing, trials
+from uam_lab.experiments.duel.flights import DuelResult, judged, load_duel, standing, trials
 
 NAN = math.nan
 PROFILES = configuration.path("profiles/fsc_geo_l1.yaml").parent
@@ -75,6 +75,17 @@ def test_standing_is_the_mean_error_in_the_second_half_of_the_longest_phase():
         block=lambda name: np.outer(error, [0.6, 0.0, 0.8, 5.0]),
     )
     assert standing(series) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("source", "spared"), [("a hand's task", 2.1), (None, 0.0)])
+def test_a_task_of_the_hand_is_judged_while_the_hand_is_under_way(source, spared):
+    """10 s from 5 s on: of the hand's task without the 2 s of the base alone and 0.1 s."""
+    time = np.arange(0.0, 20.0, 0.05)
+    on = (time >= 5.0) & (time <= 15.0)
+    phase = np.where(on, "trajectory", "transit")
+    series = SimpleNamespace(time=time, flown=time >= 1.0, in_phase=lambda name: phase == name)
+    rows = judged(series, SimpleNamespace(route=SimpleNamespace(source=source)))
+    assert time[rows][[0, -1]] == pytest.approx([5.0 + spared, 15.0 - spared], abs=0.051)
 
 
 def test_the_shipped_duel_flies_every_row_in_every_task():

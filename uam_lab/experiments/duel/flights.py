@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from uam_control.laws import catalogue
-from uam_control.mission import load_scenario
+from uam_control.mission import Scenario, load_scenario
+from uam_control.mission.scenarios.hand_motion import BEFORE
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
@@ -18,11 +19,13 @@ from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
+from uam_lab.records.results import metrics, phase_errors
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
 
 SETTLED = 0.5  # share of a hover that counts as standing: its second half
+TRIM = 0.1  # [s] of a task of the hand at each end that is not judged
 MILLI, NOTHING = 1e3, float("nan")
 
 
@@ -49,11 +52,11 @@ class Duel:
 
 @dataclass(frozen=True)
 class DuelResult:
-    """One flight: RMS errors with ramps, of a pick those of the flight, NaN for a hover or an early
-    end: end effector, platform [m], heading [deg], worst joint [deg]; standing [m]: mean offset of
-    the end effector in hover; outcome: one of `outcome.OUTCOMES`. Of a pick: largest, lift,
-    set_down [m]: largest deviation of the platform, in the flight and while the load changes; rho:
-    of the largest; placed [m]: of the payload from its goal."""
+    """One flight: RMS errors where `judged`, of a pick those of the flight, NaN for a hover or an
+    early end: end effector, platform [m], heading [deg], worst joint [deg]; standing [m]: mean
+    offset of the end effector in hover; outcome: one of `outcome.OUTCOMES`. Of a pick: largest,
+    lift, set_down [m]: largest deviation of the platform, in the flight and while the load changes;
+    rho: of the largest; placed [m]: of the payload from its goal."""
 
     row: str
     scenario: str
@@ -155,8 +158,9 @@ def measure(trial: Trial) -> DuelResult:
     outcome = recorded(trial)
     figures = figures_of(trial, outcome, outcome.abort_reason)
     ended, picks = classify(outcome.series, figures), bool(trial.payload_mass)
-    whole = figures if picks else figures["trajectory_with_ramps"]
-    rms = whole["rms"] if whole and ended == COMPLETED else {}
+    rows = judged(outcome.series, trial.load_scenario())
+    rms = phase_errors.figures(outcome.series, rows, metrics.GROUPS)["rms"] if rows.any() else {}
+    rms = {} if ended != COMPLETED else figures["rms"] if picks else rms
     return DuelResult(
         *(trial.label, Path(trial.scenario).stem, trial.seed, trial.drawn["delay"]),
         *(rms.get(name, NOTHING) for name in ("end_effector_norm_m", "epsilon_m")),
@@ -173,6 +177,17 @@ def _picked(figures: dict[str, Any]) -> tuple[float, ...]:
     most, steps = figures["max"], figures["load_steps"]
     while_loading = (steps[name]["epsilon_m"] for name in ("lift", "set_down"))
     return most["epsilon_m"], *while_loading, most["rho"], figures["payload_place_error_m"]
+
+
+def judged(series: Series, scenario: Scenario) -> np.ndarray:
+    """Return the mask (ticks,) of the trajectory with its ramps. Of a task of the hand without what
+    FSC-Lab leaves out: where the base begins before the hand and ends after it, and TRIM."""
+    rows = phase_errors.with_ramps_rows(series)
+    if rows.any() and scenario.route is not None and scenario.route.source is not None:
+        first, last = series.time[rows][[0, -1]]
+        rest = BEFORE + TRIM
+        rows &= (series.time >= first + rest) & (series.time <= last - rest)
+    return rows
 
 
 def standing(series: Series) -> float:

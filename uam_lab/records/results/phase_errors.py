@@ -33,10 +33,15 @@ def with_ramps(
     series: Series, groups: tuple[tuple[str, slice, float], ...]
 ) -> dict[str, Any] | None:
     """Return the figures of the trajectory and its ramps, None without a trajectory."""
-    rows = series.flown & np.any([series.in_phase(name) for name in WITH_RAMPS], axis=0)
+    rows = with_ramps_rows(series)
+    return figures(series, rows, groups) if rows.any() else None
+
+
+def with_ramps_rows(series: Series) -> np.ndarray:
+    """Return the mask (ticks,) of the trajectory and its ramps; nothing without a trajectory."""
     if not (series.flown & series.in_phase(TRAJECTORY)).any():
-        return None
-    return figures(series, rows, groups)
+        return np.zeros(len(series), dtype=bool)
+    return series.flown & np.any([series.in_phase(name) for name in WITH_RAMPS], axis=0)
 
 
 def distance(series: Series, rows: np.ndarray) -> np.ndarray:
