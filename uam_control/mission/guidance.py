@@ -265,6 +265,11 @@ class Guidance:
         self.write(stamp)
 
     @property
+    def below_path(self) -> float:
+        """Return how far the reference is below the path [m], after a `stay`; else 0."""
+        return 0.0 if self._brake is None else float((self._on_path() - self.motion)[CHI, Z])
+
+    @property
     def fast(self) -> bool:
         """Return whether the reference moves across faster than a landing may."""
         across = self.motion[CHI_DOT, X:Z]
@@ -359,17 +364,19 @@ class Guidance:
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
-    def retreat(self, stamp: float, way: np.ndarray) -> float:
+    def retreat(self, stamp: float, way: np.ndarray, hurried: bool = True) -> float:
         """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it.
 
-        Returns the stamp [s] of the arrival, `stamp` without a way.
+        hurried: with brake_acceleration, else with travel_speed. Returns the stamp [s] of the
+        arrival, `stamp` without a way.
         """
         if not np.any(way) or not self._take(Cue.RETREAT):
             return stamp
         goal, lengths = self._at_rest(stow=False)
         goal[POSITION] += way
-        hardest = HARDEST * float(np.linalg.norm(way)) / self.parameters.brake_acceleration
-        lengths[:] = max(float(np.max(lengths)), math.sqrt(hardest))
+        p, far = self.parameters, float(np.linalg.norm(way))
+        hurry = math.sqrt(HARDEST * far / p.brake_acceleration)
+        lengths[:] = max(float(np.max(lengths)), hurry if hurried else PEAK * far / p.travel_speed)
         self._plans.pop(True, None)
         self._brake, self._away = Segment(stamp, self.motion, goal, lengths, BASE), None
         return self._brake.end
