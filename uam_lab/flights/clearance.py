@@ -34,6 +34,8 @@ def note(vehicle: VehicleDescription, scenario: Scenario) -> str:
     """
     entries = scenario.environment
     entries = default_environment() if entries is None else entries
+    if not entries:
+        return ""
     try:
         model = Vehicle.of(vehicle).changed(scenario.surroundings).compile(0.0)
     except VehicleError:
