@@ -59,6 +59,13 @@ def test_a_signing_key_for_px4_is_refused(px4_build):
     assert "0f" * 32 not in str(error.value)
 
 
+def test_torque_setpoints_for_px4_are_refused(px4_build):
+    wrench = {"profile": ["s500", "wrench_setpoints"]}
+    with pytest.raises(SettingsError, match="PX4 v1.16 and v1.17 take no torque over MAVLink"):
+        settings(autopilot="px4", px4_dir=px4_build, **wrench)
+    assert settings(**wrench).autopilot == "builtin"
+
+
 def test_another_address_of_the_simulator_needs_an_autopilot_of_the_user(px4_build):
     away = {"sim_address": "0.0.0.0"}
     assert settings(autopilot="udp:192.0.2.7:14580", **away).sim_address == "0.0.0.0"

@@ -62,11 +62,12 @@ def position_setpoint(desired: Desired) -> Target:
     )
 
 
+WRENCH = "wrench"
 SETPOINTS: dict[str, SetpointType] = {
     "rates": rates_setpoint,
     "attitude": attitude_setpoint,
     "position": position_setpoint,
-    "wrench": wrench_setpoint,
+    WRENCH: wrench_setpoint,
 }
 
 

@@ -13,12 +13,14 @@ from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import (
+    BRIDGE,
     Profile,
     complete_profile,
     default_profile,
     load_profile,
 )
 from uam_control.profiles.profile_fit import misfits
+from uam_control.setpoints.setpoint_types import WRENCH
 from uam_control.settings import configuration
 from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.vehicle import (
@@ -176,6 +178,11 @@ def checked(o: FlightOptions) -> FlightSettings:
     profile, own = _profile(o, vehicle, namespace)
     if profile.whole and (alone := [node for node in without if node in profile.laws()]):
         raise SettingsError(f"without {alone[0]}: {o.controller} is one law of all controllers")
+    if o.autopilot == PX4 and profile.section(BRIDGE).get("setpoint") == WRENCH:
+        raise SettingsError(
+            "--autopilot px4: PX4 v1.16 and v1.17 take no torque over MAVLink: a profile with the "
+            "setpoints rates, attitude or position, or --autopilot builtin"
+        )
     mass = scenario.payload_mass if o.payload_mass is None else o.payload_mass
     feasible = Feasibility(vehicle, profile.sets["mission"], mass)
     slower: tuple[str, ...] = ()

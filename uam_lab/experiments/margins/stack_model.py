@@ -23,6 +23,7 @@ from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import BRIDGE, CONTROLLERS, Profile
+from uam_control.setpoints.setpoint_types import WRENCH
 from uam_control.stages.control_tick import (
     control_arm,
     control_attitude,
@@ -36,7 +37,7 @@ from uam_sim_bridge.plant import Vehicle
 
 RATES = ("setpoint.roll", "setpoint.pitch", "setpoint.yaw")  # body rates [rad/s] or torque, FLU
 THRUST = "setpoint.thrust"
-WRENCH, MODELLED = "wrench", ("rates", "wrench")  # setpoint types
+MODELLED = ("rates", WRENCH)  # setpoint types
 LAWS = control_position, control_attitude, control_arm
 Gains = Mapping[str, np.ndarray]  # subsystem → adapted gains, the first values of its `adaptation`
 
