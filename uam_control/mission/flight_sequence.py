@@ -236,7 +236,9 @@ class FlightSequence:
                         guidance.fly(stamp, part)
                     self.plans_flown += 1
                 elif event is Event.RESUME:
-                    self._leave_from_below(stamp)
+                    # straight up from below the path the arm is caught under the stand's top
+                    if guidance.below_path > self._parameters.contact_error:
+                        self._retreat(stamp, level=True)
                     guidance.go_on(stamp)
             self._give_way(stamp, seen)
             self._follow(stamp, decision)
@@ -366,21 +368,13 @@ class FlightSequence:
         if self._beside:
             guidance.give_way(stamp, seen.state[CHI, ARM])
 
-    def _retreat(self, stamp: float) -> float:
-        """Move clear of a stand below; return the stamp [s] of the arrival."""
+    def _retreat(self, stamp: float, level: bool = False) -> float:
+        """Move clear of a stand below, level without hurry; return the stamp [s] of the arrival."""
         guidance = self._guidance
-        return guidance.retreat(stamp, self._watch.clear(guidance.motion[CHI]))
-
-    def _leave_from_below(self, stamp: float) -> None:
-        """Move level away from a stand beside a vehicle that is below its path.
-
-        Its arm may be under the stand's top: straight up it is caught there.
-        """
-        guidance = self._guidance
-        if guidance.below_path > self._parameters.contact_error:
-            way = self._watch.clear(guidance.motion[CHI])
+        way = self._watch.clear(guidance.motion[CHI])
+        if level:
             way[Z] = 0.0
-            guidance.retreat(stamp, way, hurried=False)
+        return guidance.retreat(stamp, way, hurried=not level)
 
     def _descend(self, stamp: float) -> None:
         """Begin the descent of an unplanned landing, vertically from the vehicle's position."""

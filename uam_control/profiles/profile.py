@@ -93,6 +93,11 @@ class Profile:
         """Return the raw parameters of a node; {} if the profile has none."""
         return self.sections.get(node, {})
 
+    @property
+    def setpoint(self) -> str:
+        """Return the type of the setpoints, a name of `setpoint_types.SETPOINTS`."""
+        return self.section(BRIDGE).get("setpoint", "rates")
+
     def bridge(self) -> dict[str, Any]:
         """Return the raw parameters of the bridge, without links: every flight has its own."""
         values = self.section(BRIDGE)

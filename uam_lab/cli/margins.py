@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.margins import gains, report
     from uam_lab.experiments.margins.cases import cases_of
     from uam_lab.experiments.margins.pose_delay import pose_delay
-    from uam_lab.experiments.margins.stack_model import MODELLED, setpoint_of
+    from uam_lab.experiments.margins.stack_model import MODELLED
     from uam_lab.records.rebuild import series_of
     from uam_sim_bridge.plant import Vehicle
 
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     joints = len(described.joints)
     if options.arm is not None and len(options.arm) != joints:
         raise SettingsError(f"--arm: {len(options.arm)} angles, the vehicle has {joints} joints")
-    if setpoint_of(profile) not in MODELLED:
+    if profile.setpoint not in MODELLED:
         known = " or ".join(MODELLED)
         raise SettingsError(f"{profile.name}: margins need setpoint: {known}")
     payloads = options.payload or [0.0, 0.2]

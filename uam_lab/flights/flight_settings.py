@@ -13,7 +13,6 @@ from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import (
-    BRIDGE,
     Profile,
     complete_profile,
     default_profile,
@@ -178,7 +177,7 @@ def checked(o: FlightOptions) -> FlightSettings:
     profile, own = _profile(o, vehicle, namespace)
     if profile.whole and (alone := [node for node in without if node in profile.laws()]):
         raise SettingsError(f"without {alone[0]}: {o.controller} is one law of all controllers")
-    if o.autopilot == PX4 and profile.section(BRIDGE).get("setpoint") == WRENCH:
+    if o.autopilot == PX4 and profile.setpoint == WRENCH:
         raise SettingsError(
             "--autopilot px4: PX4 v1.16 and v1.17 take no torque over MAVLink: a profile with the "
             "setpoints rates, attitude or position, or --autopilot builtin"

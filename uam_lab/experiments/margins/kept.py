@@ -13,7 +13,7 @@ from uam_control.vehicle import CURRENT_SERVO
 from uam_lab.experiments.margins.cases import cases_of
 from uam_lab.experiments.margins.loops import Analysis
 from uam_lab.experiments.margins.report import Case
-from uam_lab.experiments.margins.stack_model import MODELLED, setpoint_of
+from uam_lab.experiments.margins.stack_model import MODELLED
 from uam_sim_bridge.plant import Vehicle
 
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to that of the vehicle
@@ -24,7 +24,7 @@ def judged(profile: Profile) -> bool:
     """Return whether the model has the profile's setpoints: body rates or torques of the base, and
     torques of the joints."""
     servos = profile.sets["arm_controller"].setpoint
-    return setpoint_of(profile) in MODELLED and servos == CURRENT_SERVO
+    return profile.setpoint in MODELLED and servos == CURRENT_SERVO
 
 
 def missed(profile: Profile, payloads: Sequence[float]) -> tuple[str, ...]:

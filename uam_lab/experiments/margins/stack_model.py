@@ -22,7 +22,7 @@ from uam_control.control.hand_steering import FADE
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import BRIDGE, CONTROLLERS, Profile
+from uam_control.profiles.profile import CONTROLLERS, Profile
 from uam_control.setpoints.setpoint_types import WRENCH
 from uam_control.stages.control_tick import (
     control_arm,
@@ -73,7 +73,7 @@ def stack_model(
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)
     posture = described.stowed if arm is None else arm
     plant, hover = plant_model(vehicle, payload_mass, posture, dry)
-    wrench = setpoint_of(profile) == WRENCH
+    wrench = profile.setpoint == WRENCH
     names = described.coordinates
     base = tuple(f"{name}{end}" for end in ("", "_dot") for name in names[: ARM.start])
     sensors = numbers["sensors"]
@@ -87,11 +87,6 @@ def stack_model(
         _autopilot(flight, hover, wrench),
     )
     return Stack(blocks, described.control_period, names)
-
-
-def setpoint_of(profile: Profile) -> str:
-    """Return the type of the profile's setpoints."""
-    return profile.section(BRIDGE).get("setpoint", "rates")
 
 
 def _of(stage: str, names: Sequence[str]) -> tuple[str, ...]:
