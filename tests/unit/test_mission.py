@@ -383,16 +383,34 @@ def test_an_arm_away_from_its_reference_stays_where_it_is_when_a_released_vehicl
         assert reference[0, 6:].tolist() == [-0.9, -1.0] and not reference[1:, 6:].any()
 
 
-@pytest.mark.parametrize(("lower", "away"), [(0.05, False), (0.2, True)])
-def test_below_its_path_beside_a_stand_it_leaves_level_before_it_climbs(lower, away):
-    """Straight up the arm is caught under the stand's top: lost, torn loose at 1.6 m of error."""
+def regained(lower):
+    """By command."""
     flight = released(at=20.0)
-    path = flight.mission._guidance._on_path()[0, :3].copy()
-    flight.state[0, :3] = path - [0.0, 0.0, lower]
+    flight.state[0, :3] = flight.mission._guidance._on_path()[0, :3] - [0.0, 0.0, lower]
     flight.step()
     assert flight.mission.request(OperatorCommand.RESUME)[0]
     flight.step()
     flight.authority = Authority()
+    return flight
+
+
+def after_failsafe(lower):
+    """Poses fail and agree again."""
+    flight = Flight("pick_and_place")
+    flight.until(lambda o: o.time > 20.0)
+    flight.readings = Readings(mocap_age=9.0)
+    flight.until(lambda o: o.state is State.FAILSAFE)
+    flight.state[0, :3] = flight.mission._guidance._on_path()[0, :3] - [0.0, 0.0, lower]
+    flight.readings = KNOWN
+    return flight
+
+
+@pytest.mark.parametrize("made", [regained, after_failsafe])
+@pytest.mark.parametrize(("lower", "away"), [(0.05, False), (0.2, True)])
+def test_below_its_path_beside_a_stand_it_leaves_level_before_it_climbs(made, lower, away):
+    """Straight up the arm is caught under the stand's top: lost, torn loose at 1.6 m of error."""
+    flight = made(lower)
+    path = flight.mission._guidance._on_path()[0, :3].copy()
     places = np.array([flight.step().reference[0, :3].copy() for _ in range(1500)])
     climbs = int(np.argmax(places[:, 2] > path[2] - 0.9 * lower))
     beside = np.linalg.norm(places[climbs, :2] - path[:2])

@@ -236,9 +236,6 @@ class FlightSequence:
                         guidance.fly(stamp, part)
                     self.plans_flown += 1
                 elif event is Event.RESUME:
-                    # straight up from below the path the arm is caught under the stand's top
-                    if guidance.below_path > self._parameters.contact_error:
-                        self._retreat(stamp, level=True)
                     guidance.go_on(stamp)
             self._give_way(stamp, seen)
             self._follow(stamp, decision)
@@ -362,19 +359,11 @@ class FlightSequence:
             self._beside = None
             return
         if self._beside is None:
-            self._beside = bool(np.any(self._watch.clear(guidance.motion[CHI])))
+            self._beside = bool(np.any(guidance.clear(guidance.motion[CHI])))
             if self._beside and flying:
                 guidance.stop(stamp, stow=False)
         if self._beside:
             guidance.give_way(stamp, seen.state[CHI, ARM])
-
-    def _retreat(self, stamp: float, level: bool = False) -> float:
-        """Move clear of a stand below, level without hurry; return the stamp [s] of the arrival."""
-        guidance = self._guidance
-        way = self._watch.clear(guidance.motion[CHI])
-        if level:
-            way[Z] = 0.0
-        return guidance.retreat(stamp, way, hurried=not level)
 
     def _descend(self, stamp: float) -> None:
         """Begin the descent of an unplanned landing, vertically from the vehicle's position."""
@@ -417,7 +406,7 @@ class FlightSequence:
             guidance.stop(stamp, decision.stow and event is not Event.ARRIVED)
             self._touchdown.stay()
             if state is State.BLIND:
-                self._retreat(stamp)
+                guidance.retreat(stamp)
         elif event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
@@ -427,7 +416,7 @@ class FlightSequence:
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
             if event in UNASKED:
-                self._clear_at = self._retreat(stamp)
+                self._clear_at = guidance.retreat(stamp)
         elif state is State.FAILSAFE:
             guidance.stop(stamp, decision.stow)
             self._fell_since = stamp

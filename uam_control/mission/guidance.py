@@ -45,6 +45,11 @@ def _unshifted(motion: np.ndarray) -> None:
     """Leave a motion (5, 6 + n) as it is."""
 
 
+def _nowhere(chi: np.ndarray) -> np.ndarray:
+    """Return no way (3,) [m]: nothing is near."""
+    return np.zeros(3)
+
+
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `retreat` and `descend`.
 
@@ -89,6 +94,7 @@ class Guidance:
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
         self.shift: Callable[[np.ndarray], None] = _unshifted  # of the path, see `Shift.add`
+        self.clear: Callable[[np.ndarray], np.ndarray] = _nowhere  # see `PayloadWatch.clear`
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next manoeuvre on."""
@@ -265,11 +271,6 @@ class Guidance:
         self.write(stamp)
 
     @property
-    def below_path(self) -> float:
-        """Return how far the reference is below the path [m], after a `stay`; else 0."""
-        return 0.0 if self._brake is None else float((self._on_path() - self.motion)[CHI, Z])
-
-    @property
     def fast(self) -> bool:
         """Return whether the reference moves across faster than a landing may."""
         across = self.motion[CHI_DOT, X:Z]
@@ -311,9 +312,12 @@ class Guidance:
     def go_on(self, stamp: float) -> None:
         """Continue on the path once the stop is complete and the arm is back at its path angles.
 
-        A brake comes to rest first, and so does the path, which a shift may still move.
+        A brake comes to rest first, and so does the path, which a shift may still move. From below
+        the path a vehicle leaves an obstacle first.
         """
         if self._brake is not None:
+            if self.course is not Course.REST and self._below_path:
+                self.retreat(stamp, hurried=False)
             ends = max(self._brake.end, self._clock.settled)
             if stamp < ends or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
                 if self._take(Cue.WAIT):
@@ -364,12 +368,16 @@ class Guidance:
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
-    def retreat(self, stamp: float, way: np.ndarray, hurried: bool = True) -> float:
-        """Move by `way` (3,) [m] from the present place, off the path; `go_on` returns to it.
+    def retreat(self, stamp: float, hurried: bool = True) -> float:
+        """Move clear of an obstacle nearby, off the path and up; `go_on` returns to it.
 
-        hurried: with brake_acceleration, else with travel_speed. Returns the stamp [s] of the
-        arrival, `stamp` without a way.
+        Level from below the path: straight up the arm is caught under a stand's top. hurried: with
+        brake_acceleration, else with travel_speed. Returns the stamp [s] of the arrival, `stamp`
+        where nothing is near.
         """
+        way = self.clear(self.motion[CHI])
+        if self._below_path:
+            way[Z] = 0.0
         if not np.any(way) or not self._take(Cue.RETREAT):
             return stamp
         goal, lengths = self._at_rest(stow=False)
@@ -380,6 +388,13 @@ class Guidance:
         self._plans.pop(True, None)
         self._brake, self._away = Segment(stamp, self.motion, goal, lengths, BASE), None
         return self._brake.end
+
+    @property
+    def _below_path(self) -> bool:
+        """Whether the reference is off the path, and more than contact_error below it."""
+        if self._brake is None:
+            return False
+        return bool((self._on_path() - self.motion)[CHI, Z] > self.parameters.contact_error)
 
     def _take(self, cue: Cue) -> bool:
         """Change the course by the table of `course`; return whether the cue has a transition."""

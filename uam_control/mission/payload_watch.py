@@ -74,7 +74,7 @@ class PayloadWatch:
         self._guidance = guidance
         self.configure(parameters)
         self._shift = Shift()
-        guidance.shift = self._shift.add
+        guidance.shift, guidance.clear = self._shift.add, self.clear
         self._stepped = -math.inf  # stamp [s]
         self._period = self.executive.period
         self._due = prepared(due, self.memory, 0.0, 0.0)
