@@ -43,9 +43,14 @@ class LawParameters(ParameterSet):
     def record(self) -> np.ndarray:
         """Return the structured array (1,) that the compiled law reads.
 
-        It has each number, vector and switch by its name, and the values of `derived`.
+        It has each number, vector and switch of the law by its name, and the values of `derived`.
+        The limits around the law are not in it: those of the arm have another length for each
+        vehicle, and the law would be compiled anew for each.
         """
-        numeric = [name for name, spec in self.specs().items() if isinstance(spec, Bound | Switch)]
+        laws = [one for one in type(self).__mro__ if issubclass(one, LawParameters)]
+        own = {name for law in laws for name in vars(law).get("__annotations__", ())}
+        specs = self.specs().items()
+        numeric = [name for name, of in specs if name in own and isinstance(of, Bound | Switch)]
         return structured({name: getattr(self, name) for name in numeric} | self.derived())
 
     def derived(self) -> dict[str, Any]:
