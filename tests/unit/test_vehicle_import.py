@@ -143,6 +143,17 @@ def test_rotors_of_a_coaxial_octocopter_turn_against_each_other(tmp_path):
     assert turns in ([True, False] * 2, [False, True] * 2)
 
 
+def test_three_rotors_are_not_replaced_by_four_of_a_layout(tmp_path):
+    """Unless the user asks for one; the fourth is on the place of the third."""
+    text = re.sub(
+        r'(child link="rotor_)3(.*?xyz)="[^"]*"', r'\g<1>3\2="-0.176777 -0.176777 0.05"', drone()
+    )
+    with pytest.raises(ImportRefused, match=r"rotors at 3 places: 'rotor_0', .* 4 to 12 are"):
+        imported(tmp_path, text)
+    made, _ = imported(tmp_path, text, answers=Answers({"rotors.layout": "hexa_x"}))
+    assert len(made.description.rotors) == 6
+
+
 def test_what_is_not_in_the_file_is_assumed_and_says_so(tmp_path):
     """Thrust: twice the weight of 1.5 + 4 × 0.01 + 2 × 0.08 + 0.07 kg, by four: 8.68 N."""
     made, _ = imported(tmp_path, drone())
@@ -259,6 +270,14 @@ HOSTILE = {  # what is replaced by what → what is said, and the text in whose 
     "limits": ('lower="-1.8"', 'lower="2.8"', "lower 2.8 is above upper 1.9", '"joint_0"'),
     "two arms": ("</robot>", SECOND_ARM, "several arms hang on the base", ""),
     "bomb": ("<robot", '<!DOCTYPE x [<!ENTITY a "b">]>\n<robot', "document type", ""),
+    "mass in g": ('<mass value="1.5"/>', '<mass value="1500"/>', "kg: in g?", '"base_link"'),
+    "inertia in g mm^2": (
+        inertial(0.08, 0.06),
+        inertial(0.08, 0.06).replace("e-05", "e+04"),
+        "in g mm^2?",
+        '"arm_0"',
+    ),
+    "limit in degrees": ('upper="1.9"', 'upper="109"', "109 rad is over two turns", '"joint_0"'),
     "no XML": ("</robot>", "", "no XML", ""),
 }  # fmt: skip
 
@@ -283,12 +302,17 @@ def test_a_base_without_mass_is_refused(tmp_path):
         imported(tmp_path, text)
 
 
-def test_another_file_is_refused_with_the_way_to_a_urdf(tmp_path):
-    with pytest.raises(ImportRefused, match="<sdf>: URDF or MJCF expected; for it: gz sdf"):
-        imported(tmp_path, "<sdf version='1.6'/>")
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [("a.urdf.xacro", "a.urdf"), ("a.xacro", "a.urdf"), ("a.urdf", "a_plain.urdf")],
+)
+def test_another_file_is_refused_with_the_way_to_a_urdf(tmp_path, name, made):
+    """The command that is printed does not write over the file that it reads."""
+    with pytest.raises(ImportRefused, match="<sdf>: URDF or MJCF expected$"):
+        imported(tmp_path, "<sdf version='1.6'/>", name)
     macros = '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="x"/></robot>'
-    with pytest.raises(ImportRefused, match="xacro macros; xacro mine.urdf"):
-        imported(tmp_path, macros)
+    with pytest.raises(ImportRefused, match=f"xacro macros; xacro {name} > {made} first"):
+        imported(tmp_path, macros, name)
 
 
 def test_fingers_are_no_joints_of_the_arm(tmp_path):
@@ -456,6 +480,21 @@ def test_what_collides_is_shown_where_nothing_visible_is(tmp_path):
     assert model.geom_size[boxes].tolist() == [[0.1, 0.1, 0.03]]
 
 
+def test_a_spring_of_an_mjcf_is_named_as_it_is_left_out(tmp_path):
+    made, _ = imported(
+        tmp_path, MJCF.replace('axis="0 1 0"', 'axis="0 1 0" stiffness="5"'), "x.xml"
+    )
+    assert any("joint shoulder: its spring is left out" in line for line in made.missing)
+
+
+def test_a_link_that_ends_at_its_joint_is_refused(tmp_path):
+    """The tool, too, is within 10 mm of the last joint: nothing says where the hand points."""
+    flat = inertial(0.08, 0.06).replace('xyz="0 0 -0.03"', 'xyz="0 0 0"')
+    text = drone(length=0.004, axes=("0 1 0",)).replace(inertial(0.08, 0.06), flat)
+    with pytest.raises(ImportRefused, match="no far end: an end effector 10 mm from it is needed"):
+        imported(tmp_path, text)
+
+
 def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):
     with pytest.raises(ImportRefused, match=r"x2.xml line 5: <body pos='0 0 nan'>: finite numbers"):
         imported(tmp_path, MJCF.replace('pos="0 0 -.05"', 'pos="0 0 nan"'), "x2.xml")
@@ -474,7 +513,8 @@ def test_directions_that_make_roll_and_yaw_one_are_not_taken(tmp_path):
     made, _ = imported(tmp_path, text, "x2.xml")
     turned = [one.counter_clockwise for one in made.description.rotors]
     assert turned in ([True, False] * 2, [False, True] * 2)
-    assert any("rotors.layout (assumed: neighbours turn" in line for line in made.missing)
+    told = "rotors.layout (assumed: neighbours turn in opposite directions, with those of the file"
+    assert any(told in line for line in made.missing)
 
 
 def test_an_error_of_mujoco_names_file_and_line(tmp_path):

@@ -12,6 +12,7 @@ from uam_lab.importing.structure import Parts
 
 LEAST_MASS = 1e-6  # [kg]
 LEAST_INERTIA = 1e-9  # [kg m^2]
+FARTHEST, HEAVIEST = 5.0, 100.0  # [m] of a rotor, radius of gyration; [kg] of a link
 SHORT = 0.01  # [m] tip from the last joint
 DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
@@ -116,7 +117,8 @@ def _far_end(parts: Parts) -> np.ndarray:
     centre = inertial(parts, link)[1]
     if np.linalg.norm(centre) < 1e-3:
         name = parts.model.joint(parts.joints[-1]).name
-        raise parts.source.error("joint", name, "its link has no far end: --end-effector NAME")
+        text = f"its link has no far end: an end effector {1e3 * SHORT:g} mm from it is needed"
+        raise parts.source.error("joint", name, text)
     along = centre / np.linalg.norm(centre)
     geoms = shapes(parts, link, True) + shapes(parts, link, False)
     reach = [float(((outline(parts, g) - origin) @ axes @ along).max()) for g in geoms]
@@ -167,8 +169,16 @@ def pose_of(parts: Parts, geom: int) -> tuple[np.ndarray, np.ndarray]:
     return place - axes @ model.mesh_pos[mesh], axes
 
 
-def refuse_far(parts: Parts) -> None:
-    """Raise ImportRefused for rotors that are metres apart: a file in mm."""
+def refuse_units(parts: Parts) -> None:
+    """Raise ImportRefused for what can only be in another unit: mm, g, g mm^2."""
     for rotor in parts.rotors:
-        if (far := float(np.linalg.norm(rotor.position))) > 5.0:
+        if (far := float(np.linalg.norm(rotor.position))) > FARTHEST:
             raise ImportRefused(f"{rotor.where}: rotor '{rotor.name}' is {far:g} m away: in mm?")
+    for link in range(len(parts.joints) + 1):
+        mass, _, tensor = inertial(parts, link)
+        body = parts.model.body(parts.base if link == 0 else _body_of(parts, link)).name
+        if mass > HEAVIEST:
+            raise parts.source.error("body", body, f"{mass:g} kg: in g? kg are expected")
+        if (most := float(np.linalg.eigvalsh(tensor)[-1])) > mass * FARTHEST**2:
+            text = f"inertia {most:.3g} kg m^2 of {mass:.3g} kg: in g mm^2? kg m^2 are expected"
+            raise parts.source.error("body", body, text)

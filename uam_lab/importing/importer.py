@@ -58,7 +58,7 @@ def import_vehicle(
             f"{file}: no arm: no revolute joint hangs on '{parts.model.body(parts.base).name}'; "
             f"--arm-of {DEFAULT_VEHICLE} hangs that vehicle's below it"
         )
-    geometry.refuse_far(parts)
+    geometry.refuse_units(parts)
     stance = stand(parts, answers)
     if arm_of is None:
         servos = numbers.servos_for(parts, answers, numbers.masses(parts))

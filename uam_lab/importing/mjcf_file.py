@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import mujoco
+import numpy as np
 from lxml import etree
 
 from uam_lab.importing.source import (
@@ -41,6 +42,10 @@ def read(file: Path, root: XmlElement) -> Source:
             if not found.is_file():
                 _leave_out(source, name, found)
             source.meshes[name] = found
+    for joint in spec.joints:
+        if np.any(np.asarray(joint.stiffness) > 0.0):
+            where = lines.get(("joint", joint.name), str(file))
+            source.notes.append(f"joint {joint.name}: its spring is left out ({where})")
     _actuators(source)
     _remove_the_rest(spec)
     return source

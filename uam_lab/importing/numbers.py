@@ -67,8 +67,8 @@ def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
 def _layout(parts: Parts, answers: Answers) -> list[Tree]:
     """Return name, position and direction of each rotor, by a layout if the file has none."""
     laid = None if parts.rotors else _lay_out(parts, answers)
-    turn, stated = rotors.turns(parts.rotors)
-    origin = (FILE, "") if stated else (ASSUMED, "neighbours turn in opposite directions")
+    turn, why = rotors.turns(parts.rotors)
+    origin = (ASSUMED, why) if why else (FILE, "")
     entries = []
     for i, one in enumerate(parts.rotors):
         place = [round(float(x), 4) + 0.0 for x in one.position]
@@ -123,6 +123,13 @@ def _lay_out(parts: Parts, answers: Answers) -> Told:
     assumed = answers.assumed
     layouts = assumed.mapping("layouts")
     usual = assumed.text("layout")
+    if parts.unusable and "rotors.layout" not in answers.given:
+        names = ", ".join(f"'{one.name}'" for one in parts.unusable)
+        raise ImportRefused(
+            f"{parts.unusable[0].where}: rotors at {len(parts.unusable)} places: {names}; "
+            f"{rotors.FEWEST} to {rotors.MOST} are possible; "
+            f"--set rotors.layout={usual} places others"
+        )
     told = answers.name("rotors.layout", usual, "the file has no rotors", layouts)
     chosen = assumed.section("layouts").section(told.value)
     mass, centre, tensor = geometry.inertial(parts, 0)

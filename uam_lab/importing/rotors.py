@@ -57,8 +57,9 @@ def find_rotors(
     data: mujoco.MjData,
     base: int,
     bodies: Sequence[int],
-) -> list[FoundRotor]:
-    """Return the rotors on the base, with the direction of each; [] if the file has none.
+) -> tuple[list[FoundRotor], list[FoundRotor]]:
+    """Return the rotors on the base, with the direction of each; [] if the file has none that can
+    fly; and, in place of them, too few or too many.
 
     bodies: that are fixed to the base. By the actuators' sites, else by bodies, sites or shapes
     that are named so.
@@ -105,7 +106,7 @@ def find_rotors(
         named = next((turn for turn, p in TURNS if p.search(one.name)), None)
         if one.facts.counter_clockwise is None:
             one.facts.counter_clockwise = named
-    return usable
+    return usable, [] if usable else max(groups, key=len)
 
 
 def _is_named(model: mujoco.MjModel, body: int, pattern: str) -> bool:
@@ -157,18 +158,20 @@ def _apart(rotors: list[FoundRotor]) -> list[FoundRotor]:
     return kept
 
 
-def turns(rotors: Sequence[FoundRotor]) -> tuple[list[bool], bool]:
-    """Return for each rotor whether it turns counter-clockwise, and whether the file says so.
+def turns(rotors: Sequence[FoundRotor]) -> tuple[list[bool], str]:
+    """Return for each rotor whether it turns counter-clockwise, and why, if not by the file.
 
     Else, and where roll and yaw would be one, neighbours turn in opposite directions, and rotors
     above each other too.
     """
     stated = [one.facts.counter_clockwise for one in rotors]
     places = np.array([one.position for one in rotors])
+    why = "neighbours turn in opposite directions"
     if all(turn is not None for turn in stated):
         moments = np.where(np.array(stated, dtype=bool), 1.0, -1.0)
         if np.linalg.matrix_rank(effectiveness(places[:, 0], -places[:, 1], moments)) == 4:
-            return [bool(turn) for turn in stated], True
+            return [bool(turn) for turn in stated], ""
+        why += ", with those of the file yaw and roll, pitch or thrust would be one"
     angles = np.arctan2(places[:, 1], places[:, 0])
     order = sorted(range(len(rotors)), key=lambda i: (round(angles[i], 2), -places[i, 2]))
     found, column, last = [False] * len(rotors), -1, None
@@ -177,7 +180,7 @@ def turns(rotors: Sequence[FoundRotor]) -> tuple[list[bool], bool]:
         column += 0 if above else 1
         found[i] = (column % 2 == 0) != bool(above)
         last = i
-    return found, False
+    return found, why
 
 
 def neighbours(positions: np.ndarray) -> float:

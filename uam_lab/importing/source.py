@@ -12,10 +12,6 @@ from lxml import etree
 from uam_control.vehicle import VehicleError
 
 LARGEST_FILE = 20e6  # [bytes] of a description
-OTHERS = {
-    "sdf": "gz sdf -p, or a URDF of the same vehicle",
-    "mujocoinclude": "the file that has it",
-}
 NAMED = re.compile(r"(?:name|material|mesh|body|joint|link) '([^']+)'")  # in a text of MuJoCo
 XmlElement = etree._Element  # lxml has no public name for its type
 
@@ -121,10 +117,11 @@ def kind_of(file: Path, root: XmlElement) -> str:
     """Return "robot" for a URDF, "mujoco" for an MJCF; raise ImportRefused for another file."""
     name = etree.QName(root).localname
     if "xacro" in "".join(root.nsmap.values()) and _has_xacro(root):
-        raise ImportRefused(f"{file}: xacro macros; xacro {file.name} > {file.stem}.urdf first")
+        plain = file.name.split(".")[0] + ("_plain" if file.suffix == ".urdf" else "")
+        raise ImportRefused(f"{file}: xacro macros; xacro {file.name} > {plain}.urdf first")
     if name in ("robot", "mujoco"):
         return name
-    other = f"; for it: {OTHERS[name]}" if name in OTHERS else ""
+    other = "; for it: the file that has it" if name == "mujocoinclude" else ""
     raise ImportRefused(f"{file} line {root.sourceline}: <{name}>: URDF or MJCF expected{other}")
 
 

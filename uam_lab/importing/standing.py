@@ -12,6 +12,7 @@ from uam_lab.importing import geometry
 from uam_lab.importing.answers import ASSUMED, DERIVED, FILE, Answers, Told
 from uam_lab.importing.structure import Parts
 
+DEGREES = 4.0 * math.pi, 720.0  # [rad] a limit in between is one in degrees
 LEAST = 0.2  # [rad] smallest range of a joint, see `loading.LEAST_RANGE`
 FOOT = 0.012  # [m] radius of a foot: class foot of parts/world.xml
 LOW = 0.015  # [m] above the lowest point: a shape of the base there is one to stand on
@@ -61,6 +62,9 @@ def _ranges(parts: Parts, answers: Answers) -> list[Told]:
     for joint in parts.joints:
         limited = bool(model.jnt_limited[joint])
         given = model.jnt_range[joint] if limited else (-endless, endless)
+        if DEGREES[0] < (largest := float(np.abs(given).max())) <= DEGREES[1]:
+            text = f"its limit of {largest:g} rad is over two turns: in degrees? rad are expected"
+            raise parts.source.error("joint", model.joint(joint).name, text)
         low, high = np.clip(given, -math.pi, math.pi)
         if high - low < LEAST:
             text = f"its range of {high - low:.3g} rad is below {LEAST:g} rad"

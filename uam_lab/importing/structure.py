@@ -39,7 +39,8 @@ class Chosen:
 class Parts:
     """What was found. base: its body; joints: of the arm, base to tip; owner (bodies,): index of
     the link to which a body belongs, 0 the base, i the link of joint i - 1, -1 not the vehicle's.
-    tip: body or site of the end effector, "" for the far end of the last link.
+    unusable: rotors of a file that has too few or too many. tip: body or
+    site of the end effector, "" for the far end of the last link.
     """
 
     source: Source
@@ -49,6 +50,7 @@ class Parts:
     joints: list[int]
     owner: np.ndarray
     rotors: list[FoundRotor]
+    unusable: list[FoundRotor]
     tip: str = ""
     magnet: bool = True
     notes: list[str] = field(default_factory=list)
@@ -81,9 +83,9 @@ def find(source: Source, chosen: Chosen) -> Parts:
     spinning = rotor_joints(model, source, inside)
     joints = _chain(source, model, base, inside, spinning, chosen.arm)
     owner = _owners(model, base, inside, joints)
-    rotors = find_rotors(source, model, data, base, [b for b in inside if owner[b] == 0])
-    parts = Parts(source, model, data, base, joints, owner, rotors, magnet=chosen.magnet)
-    for rotor in rotors:
+    found = find_rotors(source, model, data, base, [b for b in inside if owner[b] == 0])
+    parts = Parts(source, model, data, base, joints, owner, *found, magnet=chosen.magnet)
+    for rotor in parts.rotors:
         if abs(rotor.axis[2]) < LEVEL:
             raise ImportRefused(
                 f"{rotor.where}: rotor '{rotor.name}' is tilted by "
