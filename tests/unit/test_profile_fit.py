@@ -52,6 +52,15 @@ def test_the_flights_notes_have_it():
     assert "thrust_max 52 N, the rotors' full thrust is 41.4 N" in note
 
 
+@pytest.mark.parametrize(("torque", "left"), [("0/0/-0.2", "about z, of 0.228"), ("0.8/0/0", "x")])
+def test_a_plant_that_takes_most_of_the_torque_is_named(torque, left):
+    """0.3 N m of yaw, of which the laboratory leaves 76 %: 0.228; and 1.5 N m of roll."""
+    options = {"engine": "direct", "plant_preset": ["laboratory"]}
+    assert not settings("hover", **options).notes
+    (note,) = settings("hover", effects=[f"standing_load:torque={torque}"], **options).notes
+    assert note.startswith("standing_load: 0.") and left in note
+
+
 def test_a_flight_with_payload_says_that_there_is_no_end_effector(monkeypatch):
     none = chain_of(S500)._replace(has_hand=0)
     monkeypatch.setattr(flight_settings, "chain_of", lambda vehicle: none)
