@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.hand import hands, reach, stretch
+from uam_control.arm.hand import hands, hinge_angles, reach, stretch
 from uam_control.arm.posture import working_posture
 from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.flyer import Flyer
@@ -177,6 +177,11 @@ def test_an_arm_of_two_links_works_best_at_a_right_angle():
     angles = working_posture(chain, (0.0, 0.3), -end, end)
     assert angles[0] == 0.0
     assert angles[1] == pytest.approx(math.pi / 2, abs=math.radians(3.0))  # steps of 5 degrees
+    # a hinge that ends at 60 degrees lets the arm bend so far, also from beyond it on
+    for stowed in (0.0, 0.3), (0.0, 1.5):
+        bent = working_posture(chain, stowed, -end, end, (-math.pi / 3, math.pi / 3))
+        hinge = abs(hinge_angles(chain, bent[None])[0])
+        assert math.radians(50.0) < hinge <= math.pi / 3
     # area of the velocities: link 1 x link 2 at a right angle
     assert np.prod(stretch(chain, np.array([0.2, math.pi / 2]))) == pytest.approx(0.1 * 0.14)
     assert reach(chain) == pytest.approx(0.1 + 0.14 + 0.03)

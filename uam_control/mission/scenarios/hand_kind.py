@@ -268,7 +268,9 @@ class _Reader:
         if "arm_deg" in self._entry.values:
             return np.radians(self._entry.numbers("arm_deg", len(self._names)))
         room = np.array([max(0.0, min(-low, high) - swing - FREE) for low, high in self._ranges])
-        return working_posture(self._flyer.chain, self._vehicle.stowed, -room, room)
+        low, high = self._flyer.hinge
+        hinge = low + swing + FREE, high - swing - FREE
+        return working_posture(self._flyer.chain, self._vehicle.stowed, -room, room, hinge)
 
     def _sweep(self, one: Section) -> dict[str, Any]:
         """Return a swing with joint and amplitude; default: the first joint that lifts the hand."""
