@@ -101,6 +101,7 @@ def test_what_the_model_is_made_of():
         ((("rotors", "speed_max"), 2600.0), "needs 9.34 % of the full thrust of the rotors, 231.2"),
         ((("gravity",), math.inf), "gravity: inf is not finite"),
         ((("rotors", "curve_factor"), 1.5), "rotors.curve_factor: 1.5 is outside 0..1"),
+        ((("rotors", "lag_down"), 25), "rotors.lag_down: 25 s; in ms? at most 1 s"),
         ((("rotors", "efficiency"), [1.0]), "rotors.efficiency: a list of 4 numbers expected"),
         ((("rotors", "layout"), []), "rotors.layout: a list of mappings expected"),
         ((("rotors", "layout", 1, "direction"), "left"), "layout[1].direction: 'left' is not one"),
@@ -113,6 +114,7 @@ def test_what_the_model_is_made_of():
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),
         ((("control_period",), 0.02), "control_period: 0.02 s is above 0.008 s"),
         ((("control_period",), 0.01), "control_period: 0.01 s is above 0.008 s"),
+        ((("air", "drag"), [0.1, 0.1, -0.2]), "air.drag: -0.2 N s/m is below 0"),
         ((("air", "drag"), [0.1]), "air.drag: a list of 3 numbers expected"),
         ((("sensors", "mocap", "rate"), 361), "sensors.mocap.rate: 361 Hz; allowed: 30 to 360 Hz"),
         ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 Hz; allowed: 30 to 360 Hz"),
@@ -131,6 +133,15 @@ def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):
     with pytest.raises(VehicleError) as error:
         describe(changed(change), S500.file)
     assert message in str(error.value) and "\n" not in str(error.value)
+
+
+def test_two_rotors_at_one_place_are_refused_where_the_others_could_fly():
+    hexa = load_description("hexa_arm")
+    numbers = deepcopy(hexa.numbers)
+    layout = numbers["rotors"]["layout"]
+    layout[5]["position"] = list(layout[1]["position"])
+    with pytest.raises(VehicleError, match="rotors.layout: rotor_6 is where rotor_2 is"):
+        describe(numbers, hexa.file)
 
 
 @pytest.mark.parametrize(

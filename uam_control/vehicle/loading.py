@@ -28,6 +28,7 @@ LONGEST_PERIOD = 0.008  # [s] of a tick: the attitude loop oscillates in yaw wit
 HOVERS = 0.1, 0.8  # share of the full thrust in hover: the range of the autopilot, MPC_THR_HOVER
 # kinds of the files that `uam vehicle design` writes, and the law of its profiles
 PROFILE_FILE, AUTOPILOT_FILE, DESIGNED_LAW = "profile", "autopilot", "modular"
+SLOWEST_ROTOR = 1.0  # [s] time constant of a rotor's speed
 LEAST_RANGE = 0.2  # [rad] of a joint: the supervisor holds at its ends
 
 
@@ -174,6 +175,9 @@ def _rotor_model(rotor: Section) -> RotorModel:
     if not 0.0 <= factor <= 1.0:
         raise VehicleError(f"{rotor.where}.curve_factor: {factor:g} is outside 0..1")
     names = ("thrust_coefficient", "speed_max", "moment_ratio", "lag_up", "lag_down", "radius")
+    for name in ("lag_up", "lag_down"):
+        if (lag := rotor.positive(name)) > SLOWEST_ROTOR:
+            raise rotor.error(name, f"{lag:g} s; in ms? at most {SLOWEST_ROTOR:g} s")
     return RotorModel(curve_factor=factor, **{name: rotor.positive(name) for name in names})
 
 
@@ -213,6 +217,11 @@ def _check_rotors(described: VehicleDescription, rotor: Section) -> None:
         normalised_mixer(*described.geometry())
     except ValueError as error:
         raise VehicleError(f"{rotor.where}.layout: {error}") from None
+    by_place: dict[tuple[float, ...], str] = {}
+    for one in described.rotors:
+        if (other := by_place.setdefault(one.position, one.name)) != one.name:
+            text = f"{one.name} is where {other} is; coaxial ones differ in z"
+            raise VehicleError(f"{rotor.where}.layout: {text}")
     rotor.numbers("efficiency", count)
 
 

@@ -25,7 +25,8 @@ def check_plant_numbers(top: Section, servos: list[Section]) -> None:
     servos: those of each joint.
     """
     air = top.section("air")
-    air.numbers("drag", 3)
+    if min(drag := air.numbers("drag", 3)) < 0.0:
+        raise air.error("drag", f"{min(drag):g} N s/m is below 0")
     air.numbers("wind", 3)
     air.not_negative("gust")
     air.positive("gust_time")
