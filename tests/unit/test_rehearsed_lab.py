@@ -181,6 +181,16 @@ def test_the_figures_of_the_devices():
     assert device_figures.of_laboratory({}) == {} and device_figures.lines({}) == []
 
 
+def test_a_bus_that_is_slow_by_its_computer_is_named():
+    """95 % of 250 Hz are 237.5 Hz."""
+    figures = {"bus_rate_hz": 237.0, "bus_rate_possible_hz": 962.0}
+    (note,) = device_figures.slow_computer(figures, 250.0)
+    assert note.startswith("this computer was too slow for the servo bus: 237 Hz of 250 Hz")
+    for other in ({"bus_rate_hz": 238.0}, {"bus_rate_possible_hz": 200.0}):
+        assert device_figures.slow_computer(figures | other, 250.0) == []
+    assert device_figures.slow_computer({}, 250.0) == []
+
+
 class FakeLog:
     """Stamps and wall times of the two topics that count."""
 

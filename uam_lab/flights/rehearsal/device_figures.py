@@ -17,6 +17,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.messages.status import finite
+from uam_sim_bridge.nodes.arm_driver import SLOWEST
 
 NAME = "devices.json"
 # node → name of the figure → key of /diagnostics; the median over the reports
@@ -98,6 +99,20 @@ def of_laboratory(numbers: Mapping[str, Any]) -> dict[str, float]:
         "plant_ticks_late": numbers["late_ticks"],
         "plant_time_lost_s": numbers["lost_s"],
     }
+
+
+def slow_computer(figures: Mapping[str, Any], rate: float) -> list[str]:
+    """Return a note if the bus was slower than `rate` [Hz], the control rate, but could carry it.
+
+    The bus of a rehearsal without faults is then slow by its computer alone.
+    """
+    found, possible = (figures.get(name) for name in ("bus_rate_hz", "bus_rate_possible_hz"))
+    if None in (found, possible) or found >= SLOWEST * rate or possible < rate:
+        return []
+    return [
+        f"this computer was too slow for the servo bus: {found:.0f} Hz of {rate:.0f} Hz; "
+        "see docs/preflight.md, Rehearsal"
+    ]
 
 
 def lines(figures: Mapping[str, Any]) -> list[str]:

@@ -126,7 +126,11 @@ class RehearsalEngine:
         if failure is not None and not rehearsal.started and failure.name not in OWN:
             refused = refused or str(failure)
         outcome = read_outcome(settings, folder, failure, refused, stop.raised)
-        write_json(folder.path / device_figures.NAME, device_figures.read(folder.log, logs))
+        figures = device_figures.read(folder.log, logs)
+        write_json(folder.path / device_figures.NAME, figures)
+        if not settings.faults:
+            rate = 1.0 / settings.vehicle.control_period
+            outcome.notes += device_figures.slow_computer(figures, rate)
         return outcome
 
 
