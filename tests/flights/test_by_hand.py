@@ -88,7 +88,7 @@ class ByHand:
         end = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < end, f"{what}; {self.statuses()}"
-            self.operator._executor.spin_once(timeout_sec=0.05)
+            self.operator.look(0.05)
 
     def statuses(self):
         texts = {name: self.said(name)[-600:] for name in (*ORDER, "autopilot")}
