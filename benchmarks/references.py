@@ -34,18 +34,15 @@ def row(name: str, seed: int, options: argparse.Namespace) -> tuple[str, ...]:
     profiles = options.profile or [load_description(options.vehicle).profile("modular")]
     profiles = [*profiles, OPENED] if name.startswith(OPENED) else profiles
     with tempfile.TemporaryDirectory() as folder:
+        given = {"engine": options.engine, "vehicle": options.vehicle, "profile": profiles}
+        given |= {"scenario": name, "seed": seed, "out": Path(folder) / "flight"}
         try:
-            flight = Flight(
-                scenario=name,
-                seed=seed,
-                engine=options.engine,
-                vehicle=options.vehicle,
-                profile=profiles,
-                retime=True,
-                out=Path(folder) / "flight",
-            )
-        except ScenarioError as error:
-            return (name, "", "", "", "", f"refused: {error}")
+            flight = Flight(**given)
+        except ScenarioError:
+            try:
+                flight = Flight(**given, retime=True)
+            except ScenarioError as error:
+                return (name, "", "", "", "", f"refused: {error}")
         slower = flight.settings.scenario_options.slowdown
         try:
             with flight:

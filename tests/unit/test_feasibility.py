@@ -266,10 +266,11 @@ def test_retimed_is_feasible_and_not_slower_than_necessary(
     scenario = scenario_of(tmp_path_factory.mktemp("made"), f"trajectory: {text}")
     check = checked(payload=payload)
     retimed, factor = check.retimed(scenario)
-    assert not check.excesses(retimed) and 1.0 <= factor <= SLOWEST
+    reserved = replace(check, reserve=check.limits.retime_reserve)
+    assert not reserved.excesses(retimed) and 1.0 <= factor <= SLOWEST
     if factor > 1.0:
-        assert check.excesses(scenario)
-        assert check.excesses(scenario.slowed(factor / 1.02))
+        assert reserved.excesses(scenario)
+        assert reserved.excesses(scenario.slowed(factor / 1.02))
     else:
         assert retimed is scenario
 
@@ -310,6 +311,22 @@ def test_a_place_outside_the_geofence_is_not_retimed(tmp_path):
 def test_the_vehicles_own_full_thrust_limits_a_reference(full, limit):
     check = Feasibility(with_full_thrust(full), OPEN, 0.2)
     assert check.thrust_limit == pytest.approx(limit)
+
+
+def test_a_reserve_is_a_share_of_the_thrust_beyond_the_weight():
+    check = Feasibility(with_full_thrust(41.4), OPEN, 0.2)  # limit: 36 N of the profile
+    weight = (check.vehicle.mass + 0.2) * check.vehicle.gravity
+    assert replace(check, reserve=0.5).thrust_limit == pytest.approx((36.0 + weight) / 2.0)
+    heavy = replace(check, payload_mass=5.0, reserve=0.5)  # no reserve: refused as without
+    assert heavy.thrust_limit == pytest.approx(36.0)
+
+
+def test_a_note_says_that_a_reference_leaves_little_thrust():
+    race, circle_ = load_scenario("race_5_payload"), load_scenario("circle")
+    check = Feasibility(with_full_thrust(41.4), OPEN, 0.2)
+    assert re.match("the reference needs 29.6 of 36 N, .* --retime leaves some", check.note(race))
+    assert replace(check, limits=replace(OPEN, retime_reserve=0.0)).note(race) == ""
+    assert replace(check, payload_mass=0.0).note(circle_) == ""
 
 
 def test_what_a_weak_vehicle_cannot_lift_is_refused_and_retimed():

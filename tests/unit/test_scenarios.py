@@ -176,6 +176,15 @@ def test_every_scenario_of_the_library_is_smooth(name):
     assert scenario.description
 
 
+def test_a_lap_that_is_too_short_for_the_usual_ramp_has_one_of_half_its_length(tmp_path):
+    """1 m at 5 m/s: a lap of 1.26 s; 2 m/s^2 would need a ramp of some 5 s."""
+    file = tmp_path / "fast.yaml"
+    file.write_text("trajectory: {kind: circle, radius: 1, height: 1, speed: 5}\n")
+    lengths = [leg.path.length for leg in load_scenario(str(file)).route.legs]
+    lap = 2.0 * np.pi / 5.0
+    np.testing.assert_allclose(lengths, [lap / 2.0, lap / 2.0, lap / 2.0], rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

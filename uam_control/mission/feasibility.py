@@ -84,12 +84,14 @@ class _Planned:
 class Feasibility:
     """The check of references for one vehicle with its limits.
 
-    payload_mass [kg] is carried while the scenario's magnet is on.
+    payload_mass [kg] is carried while the scenario's magnet is on. reserve: share of the thrust
+    beyond the weight that a reference must leave free.
     """
 
     vehicle: VehicleDescription
     limits: MissionParameters
     payload_mass: float
+    reserve: float = 0.0
 
     def excesses(self, scenario: Scenario) -> list[Excess]:
         """Return every limit that the scenario exceeds on a flight from the origin, the earliest
@@ -232,8 +234,12 @@ class Feasibility:
 
     @property
     def thrust_limit(self) -> float:
-        """Largest force [N] of a reference: `reference_thrust`, if the vehicle has that much."""
-        return USABLE * self.vehicle.full_thrust if self._origin else self.limits.reference_thrust
+        """Largest force [N] of a reference: `reference_thrust`, if the vehicle has that much; less
+        the reserve."""
+        limits, vehicle = self.limits, self.vehicle
+        most = USABLE * vehicle.full_thrust if self._origin else limits.reference_thrust
+        weight = (vehicle.mass + self.payload_mass) * vehicle.gravity
+        return most - self.reserve * max(0.0, most - weight)
 
     @property
     def _origin(self) -> str:
@@ -246,6 +252,18 @@ class Feasibility:
         """Raise InfeasibleReference if the scenario exceeds a limit."""
         if found := self.excesses(scenario):
             raise InfeasibleReference(f"scenario {scenario.name}: {in_words(found)}")
+
+    def note(self, scenario: Scenario) -> str:
+        """Return a note about a thrust that leaves less than `retime_reserve`; "" for nothing."""
+        share = self.limits.retime_reserve
+        found = replace(self, reserve=share).excesses(scenario)
+        most = max((one.value for one in found if one.quantity == THRUST), default=0.0)
+        if not most:
+            return ""
+        return (
+            f"the reference needs {most:.3g} of {self.thrust_limit:.3g} N, and wind, a weak battery "
+            "or uneven rotors need thrust, too; --retime leaves some"
+        )
 
     def fitted(self, scenario: Scenario) -> Scenario:
         """Return the scenario with other ramps in place of those that exceed a limit, if there are
@@ -277,9 +295,18 @@ class Feasibility:
     def retimed(self, scenario: Scenario) -> tuple[Scenario, float]:
         """Return the scenario slowed down until it is feasible, and the factor, 1 if it is already.
 
-        Ramps that are not part of the trajectory are fitted first, and at each slowdown.
-        Raises InfeasibleReference if no slowdown up to SLOWEST makes it feasible.
+        `retime_reserve` stays free: what is retimed shall fly in wind, too, with a weak battery and
+        uneven rotors. A weak vehicle, whose take-off already needs some of it, has none. Ramps that
+        are not part of the trajectory are fitted first, and at each slowdown. Raises
+        InfeasibleReference if no slowdown up to SLOWEST makes it feasible.
         """
+        try:
+            return replace(self, reserve=self.limits.retime_reserve)._slowed(scenario)
+        except InfeasibleReference:
+            return self._slowed(scenario)
+
+    def _slowed(self, scenario: Scenario) -> tuple[Scenario, float]:
+        """Return the scenario and its slowdown, see `retimed`, with the reserve that is set."""
         scenario = self.fitted(scenario)
         found = self.excesses(scenario)
         if not found:

@@ -186,15 +186,15 @@ def checked(o: FlightOptions) -> FlightSettings:
         )
     mass = scenario.payload_mass if o.payload_mass is None else o.payload_mass
     feasible = Feasibility(vehicle, profile.sets["mission"], mass)
-    slower: tuple[str, ...] = ()
     if o.retime:
         scenario, factor = feasible.retimed(scenario)
         scenario_options = replace(scenario_options, slowdown=factor)
         how = f"{factor:.4g} times as slow" if factor > 1.0 else "as written"
-        slower = (f"retimed: {how}",)
+        about = f"retimed: {how}"
     else:
         scenario = feasible.fitted(scenario)
         feasible.check(scenario)
+        about = feasible.note(scenario)
     arm_on_ground.check(vehicle, scenario, o.plant)
     effects = presets.read(o.plant_preset, o.effects)
     made = FlightSettings(
@@ -209,11 +209,10 @@ def checked(o: FlightOptions) -> FlightSettings:
         scenario_source=str(o.scenario),
         scenario_options=scenario_options,
         notes=scenario.notes
-        + slower
         + misfits(profile)
         + node_options.unread(profile)
         + _about_the_arm(vehicle, scenario, mass)
-        + tuple(filter(None, [clearance.note(vehicle, scenario)]))
+        + tuple(filter(None, (about, clearance.note(vehicle, scenario))))
         + _about_the_plant(profile, effects),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, effects),

@@ -177,10 +177,11 @@ def _timing(entry: Section, shape: tuple[Harmonic, ...], laps: float) -> tuple[P
     else:
         period = entry.positive("period")
     check_length(laps * period, entry.where)
-    peak = curves.TURN * slope / period
+    peak, whole = curves.TURN * slope / period, laps * period
     default = max(DEFAULT_RAMP, SMOOTHSTEP * peak / RAMP_ACCELERATION)
-    ramp = entry.positive("ramp", default=default)
-    if ramp > laps * period:
+    # a reference that is too fast is judged as such, and can be retimed
+    ramp = entry.positive("ramp", default=default if default <= whole else whole / 2.0)
+    if ramp > whole:
         shorter = f"{laps:g} of {period:.3g} s are shorter than the ramps of {ramp:.3g} s"
         raise entry.error("laps", f"{shorter}: more laps, slower ones, or a shorter ramp")
     return curves.steady(laps, period, ramp), ramp

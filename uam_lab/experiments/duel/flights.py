@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
+from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results import metrics, phase_errors
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
@@ -135,27 +136,32 @@ def trials(duel: Duel, seeds: int) -> Iterator[Trial]:
     for label, made in duel.rows.items():
         for scenario in filter(None, (*duel.scenarios, duel.hover)):
             yield from (_trial(duel, label, made, scenario, n) for n in range(1, seeds + 1))
-        yield from (_trial(duel, label, made, duel.hover, 1, delay) for delay in duel.delays)
+        for delay in duel.delays:
+            yield delayed(_trial(duel, label, made, duel.hover, 1), delay)
 
 
-def _trial(
-    duel: Duel, label: str, made: Profile, scenario: str, seed: int, delay: float = 0.0
-) -> Trial:
-    if delay:  # the law's own: no supervisor ends the flight before it
-        mission = replace(made.sets["mission"], delay_margin=1.0)
-        made = replace(made, sets=made.sets | {"mission": mission})
-    found = [timed(parse_spec(text), {}, "delay") for text in late(1e-3 * delay, 0.0, 0.0, 0.0)]
+def _trial(duel: Duel, label: str, made: Profile, scenario: str, seed: int) -> Trial:
     effects = presets.added({}, presets.read(duel.plant))
-    return Trial(
-        *(label, made, duel.loads.get(scenario, 0.0), seed, scenario, effects),
-        faults=Schedule(tuple(found), seed),
-        drawn={"delay": delay},
-    )
+    load = duel.loads.get(scenario, 0.0)
+    return Trial(label, made, load, seed, scenario, effects, drawn={"delay": 0.0})
 
 
-def measure(trial: Trial) -> DuelResult:
-    """Fly; return the result. Raises TrialFailed as `trial.recorded`."""
-    outcome = recorded(trial)
+def delayed(trial: Trial, delay: float) -> Trial:
+    """Return a trial whose setpoints are late by `delay` [ms].
+
+    The delay is the law's own: no supervisor ends the flight before it.
+    """
+    made = trial.profile
+    mission = replace(made.sets["mission"], delay_margin=1.0)
+    made = replace(made, sets=made.sets | {"mission": mission})
+    found = [timed(parse_spec(text), {}, "delay") for text in late(1e-3 * delay, 0.0, 0.0, 0.0)]
+    late_ones = Schedule(tuple(found), trial.seed)
+    return replace(trial, profile=made, faults=late_ones, drawn={"delay": delay})
+
+
+def measure(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> DuelResult:
+    """Fly; return the result. change: see `trial.fly`. Raises TrialFailed as `trial.recorded`."""
+    outcome = recorded(trial, change)
     figures = figures_of(trial, outcome, outcome.abort_reason)
     ended, picks = classify(outcome.series, figures), bool(trial.payload_mass)
     rows = judged(outcome.series, trial.load_scenario())

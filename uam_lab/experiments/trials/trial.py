@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -108,8 +108,11 @@ class TrialResult:
         return self.outcome == LOST
 
 
-def fly(trial: Trial) -> Outcome:
-    """Fly a trial, without log and output. Raises ConfigurationError, ScenarioError."""
+def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> Outcome:
+    """Fly a trial, without log and output; change: called with the flight, if that is direct.
+
+    Raises ConfigurationError, ScenarioError.
+    """
     scenario = trial.load_scenario()
     if trial.engine == "ros":
         return _fly_nodes(trial, scenario)
@@ -117,6 +120,8 @@ def fly(trial: Trial) -> Outcome:
     flight = DirectFlight(
         scenario, trial.profile, vehicle, trial.payload_mass, trial.seed, trial.faults
     )
+    if change is not None:
+        change(flight)
     recording = flight.run()
     return Outcome(
         series=recording.series({"controller": trial.label}) if recording.count else None,
@@ -158,12 +163,12 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
     return outcome
 
 
-def recorded(trial: Trial) -> Outcome:
+def recorded(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> Outcome:
     """Fly a trial, as `fly`; return its outcome, which has a series.
 
     Raises TrialFailed if nothing was recorded, or if a flight with the nodes failed.
     """
-    outcome = fly(trial)
+    outcome = fly(trial, change)
     if outcome.series is None or (trial.engine == "ros" and outcome.partial):
         raise TrialFailed(
             f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
