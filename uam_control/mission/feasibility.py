@@ -261,8 +261,8 @@ class Feasibility:
         if not most:
             return ""
         return (
-            f"the reference needs {most:.3g} of {self.thrust_limit:.3g} N, and wind, a weak battery "
-            "or uneven rotors need thrust, too; --retime leaves some"
+            f"the reference needs {most:.3g} of {self.thrust_limit:.3g} N, and wind, a weak "
+            "battery or uneven rotors need thrust, too; --retime leaves some"
         )
 
     def fitted(self, scenario: Scenario) -> Scenario:

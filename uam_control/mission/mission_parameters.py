@@ -91,7 +91,7 @@ class FeasibilityLimits(ParameterSet):
 
     reference_thrust: float = number(36.0, "largest force that a reference needs", "N", 0.1, 1e3)
     retime_reserve: float = number(
-        0.7, "share of the thrust beyond the weight that a slowdown by `retime` leaves", "1", 0.0, 0.9
+        0.7, "share of the thrust beyond the weight that `retime` leaves free", "1", 0.0, 0.9
     )
     reference_tilt: float = number(0.35, "largest tilt that a reference needs", "rad", 0.01, 1.5)
     reference_body_rate: float = number(
