@@ -1,10 +1,39 @@
-"""What a reference needs, and what of it exceeds a limit."""
+"""What a reference needs of a vehicle, and what of it exceeds a limit."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+
+from uam_control.arm.chain import Chain, carrying
+from uam_control.arm.dynamics import inverse_dynamics
+from uam_control.coordinates import (
+    ALPHA,
+    ARM,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    POSITION,
+    ROLL,
+    YAW,
+    X,
+    Z,
+)
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import body_rates, matrix_from_euler
+from uam_control.maths.vectors import rows as matrix_rows
+from uam_control.maths.vectors import transposed, turned, vector
+from uam_control.mission.motion.flatness import attitudes
+from uam_control.mission.motion.trajectory import Trajectory, reference_rows
+from uam_control.vehicle import VehicleDescription, VehicleError, chain_and_hinge
+
+STEP = 0.01  # [s] between two times
+TURN = 2  # steps to both sides, over which a change of the body rates counts: the rate loop's lag
+STILL = 5e-7  # [rad/s] of a joint without friction
 
 
 class Excess(NamedTuple):
@@ -65,3 +94,134 @@ class Demand(NamedTuple):
     def within(self, part: slice | np.ndarray) -> Demand:
         """Return that of a part of the times."""
         return Demand(*(values[part] for values in self))
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What references need of a vehicle.
+
+    The force follows from the acceleration, the weight and the drag; it points along the body's z
+    axis, which with yaw gives the attitude; its derivative gives the body rates. The joint torques
+    follow from the motion of the arm's masses.
+    """
+
+    vehicle: VehicleDescription
+
+    def along(self, trajectory: Trajectory, times: np.ndarray, carried: np.ndarray) -> Demand:
+        """Return the demand of a reference at times (m,) [s], STEP apart; carried (m,) [kg]."""
+        rows = reference_rows(trajectory, times, len(self.vehicle.joints))
+        velocity, acceleration = rows[CHI_DOT, :, POSITION], rows[CHI_DDOT, :, POSITION]
+        mass = self.vehicle.mass + carried
+        drag = np.array(self.vehicle.numbers["air"]["drag"])
+        up = np.array([0.0, 0.0, self.vehicle.gravity])
+        force = mass[:, None] * (acceleration + up) + drag * velocity
+        angles, rotation = attitudes(force, rows[CHI, :, YAW]), np.empty((len(times), 3, 3))
+        turning, rates = np.gradient(angles, times, axis=0), np.empty_like(angles)
+        turning[:, 2] = rows[CHI_DOT, :, YAW]
+        _turns(angles, turning, rates, rotation)
+        thrust = np.linalg.norm(force, axis=1)
+        return Demand(
+            times,
+            rows[CHI, :, POSITION],
+            np.linalg.norm(velocity, axis=1),
+            thrust,
+            np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
+            rates,
+            _changes(rates[:, : YAW - ROLL]),
+            turning[:, 2],
+            rows[CHI, :, ARM],
+            rows[CHI_DOT, :, ARM],
+            *self._arm_loads(rows, rotation, rates, carried),
+        )
+
+    def _arm_loads(
+        self, rows: np.ndarray, rotation: np.ndarray, rates: np.ndarray, carried: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N].
+
+        rows (3, m, 6 + n): the reference; rotation (m, 3, 3), rates (m, 3) [rad/s]: of the base.
+        """
+        count, joints = len(carried), rows.shape[2] - ALPHA
+        if self.chain is None:
+            return np.full((count, joints), np.nan), np.full(count, np.nan)
+        turning, gravity = np.gradient(rates, STEP, axis=0), self.vehicle.gravity
+        motion = np.ascontiguousarray(rows), rotation, rates, turning, gravity
+        torques, push, pull = np.empty((count, joints)), np.empty((count, 3)), np.zeros(count)
+        _arm_torques(self.chain, *motion, torques, push)
+        for mass in np.unique(carried[carried > 0.0]):
+            loaded, more = np.empty_like(torques), np.empty_like(push)
+            _arm_torques(carrying(self.chain, mass), *motion, loaded, more)
+            at = carried == mass
+            torques[at], pull[at] = loaded[at], np.linalg.norm(more - push, axis=1)[at]
+        return torques, pull
+
+    @property
+    def chain(self) -> Chain | None:
+        """The arm; None for a vehicle of another physics engine, whose model is not MuJoCo's."""
+        return self._arm_and_hinge[0]
+
+    @property
+    def hinge(self) -> tuple[float, float]:
+        """Lowest and highest angle [rad] of the hinge that the hand hangs on, if any."""
+        return self._arm_and_hinge[1]
+
+    @cached_property
+    def _arm_and_hinge(self) -> tuple[Chain | None, tuple[float, float]]:
+        try:
+            return chain_and_hinge(self.vehicle)
+        except VehicleError:
+            return None, (-math.inf, math.inf)
+
+
+def _changes(rates: np.ndarray) -> np.ndarray:
+    """Return the larger change (m,) [rad/s^2] of rates (m, 2) [rad/s] STEP apart."""
+    found = np.zeros(len(rates))
+    apart = np.abs(rates[2 * TURN :] - rates[: -2 * TURN]).max(axis=1)
+    found[TURN : TURN + len(apart)] = apart / (2 * TURN * STEP)
+    return found
+
+
+@jit
+def _turns(
+    angles: np.ndarray, turning: np.ndarray, rates: np.ndarray, rotations: np.ndarray
+) -> None:
+    """Write the body rates (m, 3) [rad/s, FLU] and rotations (m, 3, 3), body → world.
+
+    angles, turning (m, 3): roll, pitch, yaw [rad] and their rates [rad/s].
+    """
+    for i in range(len(angles)):
+        roll, pitch, one = angles[i, 0], angles[i, 1], turning[i]
+        rates[i, 0], rates[i, 1], rates[i, 2] = body_rates(roll, pitch, one[0], one[1], one[2])
+        matrix = matrix_from_euler(angles[i])
+        for j in range(3):
+            for k in range(3):
+                rotations[i, j, k] = matrix[j, k]
+
+
+@jit
+def _arm_torques(
+    chain: Chain,
+    rows: np.ndarray,
+    rotation: np.ndarray,
+    rates: np.ndarray,
+    turning: np.ndarray,
+    gravity: float,
+    torques: np.ndarray,
+    push: np.ndarray,
+) -> None:
+    """Write the joint torques (m, n) [N m] with friction, and the force on the arm (m, 3) [N].
+
+    See `Needs._arm_loads`; turning (m, 3) [rad/s^2]; gravity [m/s^2].
+    """
+    for k in range(len(torques)):
+        acceleration = vector(rows[CHI_DDOT, k, X:ROLL])
+        force = (acceleration[0], acceleration[1], acceleration[2] + gravity)
+        force = turned(transposed(matrix_rows(rotation[k])), force)
+        base = force, vector(rates[k]), vector(turning[k])
+        found, _ = inverse_dynamics(chain, rows[:, k, ALPHA:], *base, torques[k])
+        push[k, 0], push[k, 1], push[k, 2] = found
+        for i in range(torques.shape[1]):
+            speed = rows[CHI_DOT, k, ALPHA + i]
+            torques[k, i] += chain.damping[i] * speed
+            if abs(speed) > STILL:
+                torques[k, i] += math.copysign(chain.friction[i], speed)

@@ -1,9 +1,4 @@
-"""Whether a vehicle can fly a reference, before it takes off: what exceeds which limit, and when.
-
-The force follows from the acceleration, the weight and the drag; it points along the body's z axis,
-which with yaw gives the attitude; its derivative gives the body rates. The joint torques follow
-from the motion of the arm's masses.
-"""
+"""Whether a vehicle can fly a reference, before it takes off: what exceeds a limit, and when."""
 
 from __future__ import annotations
 
@@ -14,38 +9,17 @@ from operator import attrgetter
 
 import numpy as np
 
-from uam_control.arm.chain import Chain, carrying
-from uam_control.arm.dynamics import inverse_dynamics
 from uam_control.arm.hand import hinge_angles
-from uam_control.coordinates import (
-    ALPHA,
-    ARM,
-    CHI,
-    CHI_DDOT,
-    CHI_DOT,
-    POSITION,
-    ROLL,
-    YAW,
-    X,
-    Y,
-    Z,
-)
-from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import body_rates, matrix_from_euler
-from uam_control.maths.vectors import rows as matrix_rows
-from uam_control.maths.vectors import transposed, turned, vector
-from uam_control.mission.demand import Demand, Excess
+from uam_control.coordinates import CHI, POSITION, ROLL, YAW, X, Y, Z
+from uam_control.mission.demand import STEP, Demand, Excess, Needs
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.motion.flatness import attitudes
 from uam_control.mission.motion.polynomials import Polynomials
-from uam_control.mission.motion.trajectory import Trajectory, reference_rows
 from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
 from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
-from uam_control.vehicle import NO_GRIPPER, VehicleDescription, VehicleError, chain_and_hinge
+from uam_control.vehicle import NO_GRIPPER, VehicleDescription
 
-STEP = 0.01  # [s] between two checks
 PART = 60000  # checks in one part of a long flight
 BESIDE = 4  # further ones on both sides of a part: second derivatives there are those of the whole
 CRAWL = 0.05  # [m/s] across: a vehicle that still stands on its gear turns over
@@ -57,9 +31,7 @@ THRUST = "thrust"
 ROUNDING = 1e-6  # [SI]
 DRAGGED = "height while it moves across"
 ACROSS = ("x", "y", "yaw")
-TURN = 2  # steps to both sides, over which a change of the body rates counts: the rate loop's lag
 PRECISION = 1e-3  # of the slowdown, relative
-STILL = 5e-7  # [rad/s] of a joint without friction
 ROOM = 1.002  # by which the slowdown is larger than the least one found
 USED = 0.8  # of thrust, tilt and rates by a run-up that is long enough
 CLEAR = 0.2  # [m] of a ramp from the geofence and the ground
@@ -146,7 +118,7 @@ class Feasibility:
         if not first:
             return []
         times = np.arange(0.0, max(first.values()), STEP)
-        demand = self.along(scenario.trajectory(start), times, np.zeros(len(times)))
+        demand = self._needs.along(scenario.trajectory(start), times, np.zeros(len(times)))
         p = self.limits
         stands = replace(p, reference_tilt=min(p.reference_tilt, p.start_tilt))
         found = replace(self, limits=stands).exceeded(demand)
@@ -163,9 +135,9 @@ class Feasibility:
         place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
-        if self._chain is not None:
-            lowest, highest = np.column_stack([p.joint_ranges, self._hinge])
-            hinge = hinge_angles(self._chain, np.ascontiguousarray(demand.angles))
+        if self._needs.chain is not None:
+            lowest, highest = np.column_stack([p.joint_ranges, self._needs.hinge])
+            hinge = hinge_angles(self._needs.chain, np.ascontiguousarray(demand.angles))
             angles.append(("angle of the hand's hinge", hinge))
         upper += [(*angle, highest[i], "rad") for i, angle in enumerate(angles)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
@@ -232,6 +204,10 @@ class Feasibility:
         lands = ~across & ~airborne
         return np.where(across, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
 
+    @cached_property
+    def _needs(self) -> Needs:
+        return Needs(self.vehicle)
+
     @property
     def thrust_limit(self) -> float:
         """Largest force [N] of a reference: `reference_thrust`, if the vehicle has that much; less
@@ -284,7 +260,7 @@ class Feasibility:
         best, least = None, math.inf
         for ramp in within_room(goal, np.minimum(room[0], begin), np.maximum(room[1], begin)):
             times = np.arange(0.0, ramp.length, STEP)
-            demand = self.along(ramp, times, np.zeros(len(times)))
+            demand = self._needs.along(ramp, times, np.zeros(len(times)))
             used = max((values / limit).max() for _, values, limit, _ in self._motion(demand))
             if used < least and not self.exceeded(demand, STANDING):
                 best, least = ramp, used
@@ -343,7 +319,7 @@ class Feasibility:
     def _planned(self, flight: _Planned, part: slice) -> Demand:
         """Return what a part of a flight needs."""
         times = flight.times[part]
-        return self.along(flight.trajectory, times, self.carried(flight.scenario, times))
+        return self._needs.along(flight.trajectory, times, self.carried(flight.scenario, times))
 
     def carried(self, scenario: Scenario, times: np.ndarray) -> np.ndarray:
         """Return the carried mass (m,) [kg] at times (m,) [s]."""
@@ -352,126 +328,7 @@ class Feasibility:
             on[times >= at] = energised
         return self.payload_mass * on
 
-    def along(self, trajectory: Trajectory, times: np.ndarray, carried: np.ndarray) -> Demand:
-        """Return the demand of a reference at times (m,) [s], STEP apart; carried (m,) [kg]."""
-        rows = reference_rows(trajectory, times, len(self.vehicle.joints))
-        velocity, acceleration = rows[CHI_DOT, :, POSITION], rows[CHI_DDOT, :, POSITION]
-        mass = self.vehicle.mass + carried
-        drag = np.array(self.vehicle.numbers["air"]["drag"])
-        up = np.array([0.0, 0.0, self.vehicle.gravity])
-        force = mass[:, None] * (acceleration + up) + drag * velocity
-        angles, rotation = attitudes(force, rows[CHI, :, YAW]), np.empty((len(times), 3, 3))
-        turning, rates = np.gradient(angles, times, axis=0), np.empty_like(angles)
-        turning[:, 2] = rows[CHI_DOT, :, YAW]
-        _turns(angles, turning, rates, rotation)
-        thrust = np.linalg.norm(force, axis=1)
-        return Demand(
-            times,
-            rows[CHI, :, POSITION],
-            np.linalg.norm(velocity, axis=1),
-            thrust,
-            np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
-            rates,
-            _changes(rates[:, : YAW - ROLL]),
-            turning[:, 2],
-            rows[CHI, :, ARM],
-            rows[CHI_DOT, :, ARM],
-            *self._arm_loads(rows, rotation, rates, carried),
-        )
-
-    def _arm_loads(
-        self, rows: np.ndarray, rotation: np.ndarray, rates: np.ndarray, carried: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N].
-
-        rows (3, m, 6 + n): the reference; rotation (m, 3, 3), rates (m, 3) [rad/s]: of the base.
-        """
-        count, joints = len(carried), rows.shape[2] - ALPHA
-        if self._chain is None:
-            return np.full((count, joints), np.nan), np.full(count, np.nan)
-        turning, gravity = np.gradient(rates, STEP, axis=0), self.vehicle.gravity
-        motion = np.ascontiguousarray(rows), rotation, rates, turning, gravity
-        torques, push, pull = np.empty((count, joints)), np.empty((count, 3)), np.zeros(count)
-        _arm_torques(self._chain, *motion, torques, push)
-        for mass in np.unique(carried[carried > 0.0]):
-            loaded, more = np.empty_like(torques), np.empty_like(push)
-            _arm_torques(carrying(self._chain, mass), *motion, loaded, more)
-            at = carried == mass
-            torques[at], pull[at] = loaded[at], np.linalg.norm(more - push, axis=1)[at]
-        return torques, pull
-
-    @property
-    def _chain(self) -> Chain | None:
-        """The arm; None for a vehicle of another physics engine, whose model is not MuJoCo's."""
-        return self._arm_and_hinge[0]
-
-    @property
-    def _hinge(self) -> tuple[float, float]:
-        """Lowest and highest angle [rad] of the hinge that the hand hangs on, if any."""
-        return self._arm_and_hinge[1]
-
-    @cached_property
-    def _arm_and_hinge(self) -> tuple[Chain | None, tuple[float, float]]:
-        try:
-            return chain_and_hinge(self.vehicle)
-        except VehicleError:
-            return None, (-math.inf, math.inf)
-
 
 def in_words(excesses: list[Excess]) -> str:
     """Return the excesses in one line."""
     return "; ".join(excess.text for excess in excesses)
-
-
-def _changes(rates: np.ndarray) -> np.ndarray:
-    """Return the larger change (m,) [rad/s^2] of rates (m, 2) [rad/s] STEP apart."""
-    found = np.zeros(len(rates))
-    apart = np.abs(rates[2 * TURN :] - rates[: -2 * TURN]).max(axis=1)
-    found[TURN : TURN + len(apart)] = apart / (2 * TURN * STEP)
-    return found
-
-
-@jit
-def _turns(
-    angles: np.ndarray, turning: np.ndarray, rates: np.ndarray, rotations: np.ndarray
-) -> None:
-    """Write the body rates (m, 3) [rad/s, FLU] and rotations (m, 3, 3), body → world.
-
-    angles, turning (m, 3): roll, pitch, yaw [rad] and their rates [rad/s].
-    """
-    for i in range(len(angles)):
-        roll, pitch, one = angles[i, 0], angles[i, 1], turning[i]
-        rates[i, 0], rates[i, 1], rates[i, 2] = body_rates(roll, pitch, one[0], one[1], one[2])
-        matrix = matrix_from_euler(angles[i])
-        for j in range(3):
-            for k in range(3):
-                rotations[i, j, k] = matrix[j, k]
-
-
-@jit
-def _arm_torques(
-    chain: Chain,
-    rows: np.ndarray,
-    rotation: np.ndarray,
-    rates: np.ndarray,
-    turning: np.ndarray,
-    gravity: float,
-    torques: np.ndarray,
-    push: np.ndarray,
-) -> None:
-    """Write the joint torques (m, n) [N m] with friction, and the force on the arm (m, 3) [N].
-
-    See `Feasibility._arm_loads`; turning (m, 3) [rad/s^2]; gravity [m/s^2].
-    """
-    for k in range(len(torques)):
-        acceleration = vector(rows[CHI_DDOT, k, X:ROLL])
-        force = (acceleration[0], acceleration[1], acceleration[2] + gravity)
-        force = turned(transposed(matrix_rows(rotation[k])), force)
-        base = force, vector(rates[k]), vector(turning[k])
-        found, _ = inverse_dynamics(chain, rows[:, k, ALPHA:], *base, torques[k])
-        push[k, 0], push[k, 1], push[k, 2] = found
-        for i in range(torques.shape[1]):
-            speed = rows[CHI_DOT, k, ALPHA + i]
-            torques[k, i] += chain.damping[i] * speed
-            if abs(speed) > STILL:
-                torques[k, i] += math.copysign(chain.friction[i], speed)
