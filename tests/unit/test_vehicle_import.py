@@ -500,7 +500,19 @@ def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):
         imported(tmp_path, MJCF.replace('pos="0 0 -.05"', 'pos="0 0 nan"'), "x2.xml")
 
 
+@pytest.mark.parametrize(
+    "names", [("1", "1e3"), ("no", "null"), ("a, b", "c: #d"), ("[x]", " 'y"), ("!t", "関 節")]
+)
+def test_joints_keep_names_that_yaml_reads_as_something_else(tmp_path, names):
+    text = drone()
+    for old, new in zip(("joint_0", "joint_1"), names, strict=True):
+        text = text.replace(f'joint name="{old}"', f'joint name="{new}"')
+    assert imported(tmp_path, text)[0].description.joint_names == names
+
+
 def test_a_joint_with_a_name_of_ours_is_refused(tmp_path):
+    with pytest.raises(ImportRefused, match=r"joint 'alpha_2': .* scenarios call it alpha_1"):
+        imported(tmp_path, drone().replace("joint_0", "alpha_2").replace("joint_1", "alpha_1"))
     with pytest.raises(ImportRefused, match=r"joint 'base': another name is needed"):
         imported(tmp_path, drone().replace("joint_0", "base"))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +24,7 @@ from uam_sim_bridge.plant import Vehicle
 SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone
 READERS = {"robot": urdf_file.read, "mujoco": mjcf_file.read}
 BELOW = 0.06  # [m] from the centre of mass: where the underside of the base is looked for
+PLAIN = re.compile(r"(?!(?i:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][\w./-]*")  # text in YAML
 PREFIX = "hung/"
 OPTIONS = tuple(k for k in vars(mujoco.MjOption) if not k.startswith("_"))
 TOP = 0.008  # [m] of the bracket below the origin, of parts/arm_2r.xml and arm_3r.xml
@@ -116,6 +119,8 @@ def _text(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, list):
         return "[" + ", ".join(map(_text, value)) + "]"
+    if isinstance(value, str) and not PLAIN.fullmatch(value):
+        return json.dumps(value, ensure_ascii=False)
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 

@@ -227,6 +227,9 @@ def _check_joint(source: Source, model: mujoco.MjModel, chain: Sequence[int]) ->
     name, kind = model.joint(joint).name, model.jnt_type[joint]
     if name in TAKEN or not name:
         raise source.error("joint", name, f"another name is needed: not {', '.join(TAKEN)}")
+    if re.fullmatch(r"alpha_\d+", name) and name != f"alpha_{len(chain)}":
+        text = f"another name is needed: scenarios call it alpha_{len(chain)}"
+        raise source.error("joint", name, text)
     if kind != HINGE:
         said = "prismatic" if kind == SLIDE else "floating" if kind == FREE else "a ball"
         raise source.error("joint", name, f"{said} joint in the arm; revolute ones are possible")
