@@ -480,6 +480,17 @@ def test_what_collides_is_shown_where_nothing_visible_is(tmp_path):
     assert model.geom_size[boxes].tolist() == [[0.1, 0.1, 0.03]]
 
 
+@pytest.mark.parametrize(("turn", "said"), [("180 0 0", "180"), ("0 20 0", "20"), ("0 0 90", "")])
+def test_a_base_whose_z_axis_does_not_point_up_is_refused(tmp_path, turn, said):
+    """A frame of x forward, z down would hang the arm on top; a heading is no matter."""
+    text = MJCF.replace('pos="0 0 0.1"', f'pos="0 0 0.1" euler="{turn}"', 1)
+    if not said:
+        imported(tmp_path, text, "x2.xml")
+        return
+    with pytest.raises(ImportRefused, match=f"body 'x2': its z axis is {said} deg from up"):
+        imported(tmp_path, text, "x2.xml")
+
+
 def test_a_spring_of_an_mjcf_is_named_as_it_is_left_out(tmp_path):
     made, _ = imported(
         tmp_path, MJCF.replace('axis="0 1 0"', 'axis="0 1 0" stiffness="5"'), "x.xml"

@@ -19,7 +19,7 @@ OWN = ("payload", "stand", "drop_mat", "magnet")  # bodies of this project that 
 TAKEN = (BASE, "payload", "magnet_swing")  # joints of every vehicle
 TIPS = (r"^magnet$|magnet_face", "tool0|tcp|tool_tip", "end_?effector|eef|ee_link|(^|_)ee($|_)")
 TIPS += ("gripper|hand", "tool")
-LEVEL = 0.985  # cosine of the largest tilt of a rotor
+LEVEL = 0.985  # cosine of the largest tilt of a rotor, and of the base in the file
 HINGE, SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 FREE = mujoco.mjtJoint.mjJNT_FREE
 
@@ -79,6 +79,10 @@ def find(source: Source, chosen: Chosen) -> Parts:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     base = _base(source, model, chosen.base)
+    if (up := float(data.xmat[base][8])) < LEVEL:
+        tilt = np.degrees(np.arccos(max(up, -1.0)))
+        text = f"its z axis is {tilt:.0f} deg from up; x forward, z up expected"
+        raise source.error("body", model.body(base).name, text)
     inside = [b for b in range(base, model.nbody) if _is_below(model, b, base)]
     spinning = rotor_joints(model, source, inside)
     joints = _chain(source, model, base, inside, spinning, chosen.arm)
