@@ -96,7 +96,7 @@ def test_every_parameter_is_described_and_ranged(start, probe, tmp_path, node):
 REFUSED = [
     (wiring.PLANT, "seed:=1.5", "seed: 1.5 is no integer; allowed: 0 to 2147483647"),
     (wiring.PLANT, "hil_port:=70000", "hil_port: 70000 is outside 1 to 65535"),
-    (wiring.PLANT, "payload_mass:=-1.0", "payload_mass: -1.0 is outside 0 to 2 kg"),
+    (wiring.PLANT, "payload_mass:=-1.0", "payload_mass: -1.0 is outside 0 to 5 kg"),
     (wiring.PLANT, "clock:=sundial", "clock: 'sundial' is not one of lockstep, realtime"),
     (wiring.PLANT, "foreign:=5", "foreign: 5 is no text; allowed: NODE=NAME with commas"),
     (wiring.PLANT, "arm_start:=[0.1]", "arm_start: a list of 2 numbers expected"),

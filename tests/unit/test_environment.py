@@ -126,7 +126,7 @@ def test_a_vehicle_file_from_before_loses_its_own_surroundings(tmp_path):
         ({"kind": "box", "position": [1, 0], "material": "gold"}, "material: 'gold' is not one of"),
         ({"kind": "slope", "position": [1, 0], "angle_deg": 80}, "angle_deg: 80; at most 60"),
         ({"kind": "payload", "rests_on": "moon"}, "rests_on: no entry stands before it"),
-        ({"kind": "payload", "position": [1, 0], "mass": 3}, "mass: 3 kg; 0 to 2 kg"),
+        ({"kind": "payload", "position": [1, 0], "mass": 6}, "mass: 6 kg; 0 to 5 kg"),
     ],
 )
 def test_an_entry_is_refused_in_one_line(tmp_path, entry, said):

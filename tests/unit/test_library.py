@@ -43,7 +43,7 @@ from uam_sim_bridge.faults import FaultError
         ({"seed": 1.5}, "seed: 1.5 is no integer; allowed: 0 to 2147483647"),
         ({"seed": True}, "seed: True is no integer"),
         ({"instance": "a"}, "instance: 'a' is no integer; allowed: 0 to "),
-        ({"payload_mass": "heavy"}, "payload_mass: 'heavy' is not numeric; allowed: 0 to 2 kg"),
+        ({"payload_mass": "heavy"}, "payload_mass: 'heavy' is not numeric; allowed: 0 to 5 kg"),
         ({"observer": 3}, "observer: an Observer expected, got 3"),
         ({"vehicle_changes": 3}, "vehicle_changes: name → value expected, got 3"),
         ({"vehicle_changes": {"air.nosuch": [1]}}, "unknown entry 'air.nosuch'; air has: drag, "),

@@ -22,6 +22,7 @@ import argparse
 
 from uam_control.laws import catalogue
 from uam_control.mission import load_scenario
+from uam_control.mission.scenarios.environment import HEAVIEST
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
@@ -41,7 +42,6 @@ from uam_lab.flights.flight_options import ENGINES
 from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
-from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 
 def add(commands: Subcommands) -> None:
@@ -50,7 +50,7 @@ def add(commands: Subcommands) -> None:
     command.vehicle()
     command.scenario()
     command.option("--seeds", "N", "seeds 1..N", 5, type=count)
-    mass = number("mass", "kg", 0.0, PAYLOAD_MAX)
+    mass = number("mass", "kg", 0.0, HEAVIEST)
     text = f"payloads (default {' '.join(map(str, plan.PAYLOADS))})"
     command.option("--payload-mass", "KG", text, type=mass, nargs="+")
     command.choice("--engine", ENGINES, "direct", "nodes and sockets, or one loop without them")

@@ -9,6 +9,7 @@ from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.mission import ScenarioOptions
+from uam_control.mission.scenarios.environment import HEAVIEST
 from uam_control.settings.parameter_set import (
     ParameterError,
     ParameterSet,
@@ -26,7 +27,6 @@ from uam_lab.flights.node_options import SettingsError
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
-from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
 
 ENGINES = ("ros", "direct")
@@ -109,7 +109,7 @@ class FlightOptions(ParameterSet):
         "ADDRESS",
     )
     gcs: str = text("", "ground station, as udp:127.0.0.1:14550 (default: none)", "URL")
-    payload_mass: float | None = number(None, "default: the scenario's", "kg", 0.0, PAYLOAD_MAX)
+    payload_mass: float | None = number(None, "default: the scenario's", "kg", 0.0, HEAVIEST)
     seed: int = integer(1, "of all noise", 0, LAST_SEED)
     out: str | Path | None = name_or_file(None, "result folder", "DIR")
     vehicle_changes: Mapping[str, Any] = entries("changes of the vehicle's numbers")

@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from uam_control.coordinates import ARM
+from uam_control.mission.scenarios.environment import HEAVIEST
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.json_text import read_mapping
 from uam_control.settings.parameter_set import (
@@ -28,7 +29,6 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
-from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
@@ -40,7 +40,7 @@ class SimulatedParameters(ParameterSet):
     vehicle_changes: str = text(
         "{}", "dotted entries of the vehicle's file to replace", 'JSON, as {"air.gust": 1.0}'
     )
-    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
+    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, HEAVIEST)
     seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
     arm_start: tuple = vector(
         (),

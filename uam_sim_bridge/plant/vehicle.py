@@ -30,7 +30,6 @@ from uam_sim_bridge.plant.gripper import FINGERS, add_drive
 from uam_sim_bridge.plant.surroundings import PAYLOAD, add_surroundings
 
 T = TypeVar("T")
-PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 MASS_TOLERANCE = 1e-3  # relative
 LOAD_BELOW = 0.0505  # [m] `variation.tip_mass` below the magnet's pivot: where a payload hangs
 

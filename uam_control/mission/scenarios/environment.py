@@ -16,7 +16,7 @@ from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 
 ENVIRONMENT, PAYLOAD = "environment", "payload"
-HEAVIEST = 2.0  # [kg] of a payload
+HEAVIEST = 5.0  # [kg] of a payload
 FARTHEST = 50.0  # [m] of a place, and of a size
 OVERHANG = 1e-6  # [m]
 STEEPEST = 60.0  # [deg]
