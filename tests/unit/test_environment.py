@@ -180,5 +180,36 @@ BESIDE = {"kind": "box", "size": [0.2, 0.2, 2.0]}
     [(0.3, "leads through box"), (0.42, "passes box within 0.0"), (1.5, "")],
 )
 def test_what_the_reference_comes_near_is_a_note(tmp_path, y, said):
-    found = clearance.note(S500, scenario(tmp_path, [BESIDE | {"position": [0.0, y]}]))
+    found = "".join(
+        clearance.notes(S500, scenario(tmp_path, [BESIDE | {"position": [0.0, y]}]), 0.0)
+    )
     assert said in found and bool(said) is bool(found)
+
+
+@pytest.mark.parametrize(
+    ("x", "said"), [(-0.789, ""), (-0.889, "closes 0.10 m from the payload: x +0.10")]
+)
+def test_a_tool_that_closes_beside_the_payload_is_a_note(tmp_path, x, said):
+    """As with an arm of other lengths than those for which the scenario was written."""
+    moved = yaml.safe_load(path("scenarios/quick_pick.yaml").read_text())
+    stand = {"kind": "stand", "position": [x, 0.0]}
+    moved["environment"] = [stand, {"kind": "payload", "rests_on": "stand"}]
+    file = tmp_path / "moved.yaml"
+    file.write_text(yaml.safe_dump(moved))
+    found = "; ".join(clearance.notes(S500, load_scenario(str(file), S500), 0.2))
+    assert said in found and bool(said) is bool(found)
+    assert not clearance.notes(S500, load_scenario(str(file), S500), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "name"),
+    [
+        ("s500_arm", "pick_and_place"),
+        ("s500_gripper", "two_finger_side"),
+        ("t650_gripper", "pillars"),
+    ],
+)
+def test_the_tools_here_close_at_the_payload(vehicle, name):
+    described = load_description(vehicle)
+    scenario = load_scenario(name, described)
+    assert not any("closes" in one for one in clearance.notes(described, scenario, 0.2))

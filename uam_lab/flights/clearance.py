@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, POSITION, YAW, Z
+from uam_control.grasp import grasp_windows
+from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.mission import Scenario
 from uam_control.mission.motion.flatness import attitudes
 from uam_control.mission.motion.trajectory import reference_rows
 from uam_control.mission.scenarios.environment import PAYLOAD, default_environment
 from uam_control.mission.scenarios.scenario import standing
-from uam_control.vehicle import VehicleDescription, VehicleError
+from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
 from uam_sim_bridge.plant.arm_geometry import BASE
-from uam_sim_bridge.plant.surroundings import VEHICLE, distance, shapes
+from uam_sim_bridge.plant.surroundings import VEHICLE, Entry, distance, shapes
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 STEP = 0.05  # [s] between two poses
 MOST = 4000  # poses of a long flight
 NEAR = 0.05  # [m] that the errors of a flight may need
+BESIDE = 0.04  # [m] of a tool from where it grips, that its alignment with a payload mends
 GRIPS = 10.0, 8.0  # [s] before and after a switch of the gripper: it works at what stands there
 
 
-def note(vehicle: VehicleDescription, scenario: Scenario) -> str:
-    """Return a note about what the reference leads through, or passes within NEAR; "" for nothing.
+def notes(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:
+    """Return notes about what the reference leads through, or passes within NEAR, and about a tool
+    that does not close at the payload of `mass` [kg].
 
     Not judged: what is near the vehicle at take-off and landing, a grip, and a plant whose model is
     not MuJoCo's.
@@ -35,11 +39,49 @@ def note(vehicle: VehicleDescription, scenario: Scenario) -> str:
     entries = scenario.environment
     entries = default_environment() if entries is None else entries
     if not entries:
-        return ""
+        return ()
     try:
         model = Vehicle.of(vehicle).changed(scenario.surroundings).compile(0.0)
     except VehicleError:
+        return ()
+    found = [_near(model, entries, vehicle, scenario)]
+    payload = next((entry for entry in entries if entry["kind"] == PAYLOAD), None)
+    if mass and payload is not None:
+        found.append(_beside(model, payload, vehicle, scenario))
+    return tuple(filter(None, found))
+
+
+def _beside(
+    model: mujoco.MjModel, payload: Entry, vehicle: VehicleDescription, scenario: Scenario
+) -> str:
+    """Return a note about a tool that first closes farther than BESIDE from where it grips."""
+    start, chain = standing(scenario.arm_start), chain_of(vehicle)
+    flown = scenario.begun_at(start)
+    windows = grasp_windows(flown.motions, flown.magnet, dict(flown.approaches))
+    if not windows or not chain.has_hand:
         return ""
+    window, data = windows[0], mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    place = data.body(PAYLOAD).xpos + [0.0, 0.0, payload["size"][2] / 2] + window.approach.point
+    times = np.array([window.grip])
+    rows = reference_rows(flown.trajectory(start), times, len(vehicle.joints))
+    off = hand_and_levers(chain, rows[CHI, 0])[0] - place
+    if (far := float(np.linalg.norm(off))) < BESIDE:
+        return ""
+    x, y, z = off
+    return (
+        f"at {window.grip:.1f} s the tool of {vehicle.name} closes {far:.2f} m from the payload: "
+        f"x {x:+.2f}, y {y:+.2f}, z {z:+.2f} m too far"
+    )
+
+
+def _near(
+    model: mujoco.MjModel,
+    entries: Sequence[Entry],
+    vehicle: VehicleDescription,
+    scenario: Scenario,
+) -> str:
+    """Return a note about what the reference leads through or passes, "" for nothing."""
     parts = shapes(model, entries)
     own = parts.pop(VEHICLE)
     load = next((entry["name"] for entry in entries if entry["kind"] == PAYLOAD), "")

@@ -212,7 +212,8 @@ def checked(o: FlightOptions) -> FlightSettings:
         + misfits(profile)
         + node_options.unread(profile)
         + _about_the_arm(vehicle, scenario, mass)
-        + tuple(filter(None, (about, clearance.note(vehicle, scenario))))
+        + ((about,) if about else ())
+        + clearance.notes(vehicle, scenario, mass)
         + _about_the_plant(profile, effects),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, effects),
