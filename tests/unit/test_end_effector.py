@@ -4,6 +4,7 @@ MuJoCo judges the shipped scenarios; an arm of our own with a yaw joint, a chain
 """
 
 import math
+import shutil
 from dataclasses import replace
 
 import mujoco
@@ -23,6 +24,7 @@ from uam_control.mission.scenarios.curves import Harmonic
 from uam_control.mission.scenarios.hand_motion import BEFORE, Task, Unreachable, flat, following
 from uam_control.mission.scenarios.scenario import ScenarioError
 from uam_control.profiles.profile import default_profile
+from uam_control.settings.configuration import path
 from uam_control.vehicle import chain_of, load_description
 
 VEHICLES = ("s500_arm", "s500_arm3", "hexa_arm")
@@ -153,6 +155,22 @@ def test_an_arm_that_turns_about_the_vertical_holds_its_heading_too():
     np.testing.assert_allclose(found[:, :3], np.tile([0.0, 0.0, 0.9], (200, 1)), atol=1e-4)
     np.testing.assert_allclose(found[:, 3], 0.0, atol=1e-3)
     assert np.ptp(flown.chi[:, 0]) == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_hand_that_heads_backward_is_on_its_task(tmp_path):
+    """Its frame is turned by half a turn: the base heads against the path, and is solved for."""
+    shutil.copytree(path("vehicle/parts"), tmp_path / "parts")
+    (tmp_path / "mine.xml").write_text(path("vehicle/s500_arm.xml").read_text())
+    magnet = tmp_path / "parts" / "magnet.xml"
+    site = '<site name="magnet_face"'
+    assert site in magnet.read_text()
+    magnet.write_text(magnet.read_text().replace(site, f'{site} euler="0 0 180"'))
+    (tmp_path / "mine.yaml").write_text("derives: s500_arm\nmodel: mine.xml\n")
+    vehicle = load_description(tmp_path / "mine.yaml")
+    motion = load_scenario("ee_circle_020", vehicle).route.path
+    heading = load_scenario("ee_circle_020", load_description()).route.path
+    turned = motion.rows(np.array([9.0]), 1)[0, 0, 5] - heading.rows(np.array([9.0]), 1)[0, 0, 5]
+    assert math.cos(turned) == pytest.approx(-1.0, abs=1e-3)
 
 
 def test_a_slower_task_is_solved_anew():

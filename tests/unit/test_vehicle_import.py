@@ -331,6 +331,14 @@ def test_a_vehicle_may_have_no_magnet(tmp_path):
     assert tool == pytest.approx((0.02, 0.0, -0.3))
 
 
+@pytest.mark.parametrize("axis", ["0 1 0", "0 -1 0"])
+def test_the_tool_heads_where_the_base_does(tmp_path, axis):
+    """Whatever the sign of the last joint's axis: the tool's y axis points to the left."""
+    made, model = imported(tmp_path, drone(axes=("0 1 0", axis)))
+    here = posed(model, made.description.joint_names, (0.0, 0.0))
+    assert here.body("magnet").xmat[[1, 4, 7]] == pytest.approx((0.0, 1.0, 0.0), abs=1e-9)
+
+
 def test_of_two_arms_one_is_chosen(tmp_path):
     text = drone().replace("</robot>", SECOND_ARM)
     made, _ = imported(tmp_path, text, chosen=Chosen(arm="joint_0"))

@@ -13,6 +13,7 @@ from uam_lab.importing.structure import Parts
 LEAST_MASS = 1e-6  # [kg]
 LEAST_INERTIA = 1e-9  # [kg m^2]
 FARTHEST, HEAVIEST = 5.0, 100.0  # [m] of a rotor, radius of gyration; [kg] of a link
+ALONG = 1e-6  # of an axis that counts as upright or forward
 SHORT = 0.01  # [m] tip from the last joint
 DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
@@ -85,7 +86,8 @@ def outline(parts: Parts, geom: int, exact: bool = True) -> np.ndarray:
 def tip(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
     """Return place (3,) [m] and axes (3, 3) of the magnet's pivot in the frame of the last link.
 
-    z points back along the link, y against the axis about which the face shall level itself.
+    z points back along the link, y along the axis about which the face shall level itself, to the
+    left of the base where it has a left side: the tool heads where the base does.
     """
     link = len(parts.joints)
     origin, axes = parts.frame(link)
@@ -98,7 +100,8 @@ def tip(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
         across = axis - (axis @ along) * along
         if np.linalg.norm(across) > 0.5:
             break
-    y = -across / np.linalg.norm(across)
+    left = float(across @ axes.T @ parts.frame(0)[1][:, 1])
+    y = across / (np.linalg.norm(across) if left > ALONG else -np.linalg.norm(across))
     return place, np.column_stack([np.cross(y, -along), y, -along])
 
 

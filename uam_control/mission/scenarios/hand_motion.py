@@ -116,6 +116,9 @@ def _solved(
         wanted = _wanted(task, times)
         chi = wanted.copy()
         chi[:, PITCH] = 0.0  # the task's elevation
+        level = _placed(chi)
+        level[:, YAW] = 0.0
+        chi[:, YAW] -= np.unwrap(hands(flyer.chain, level)[:, HEADING])
         if base is None:
             chi[:, POSITION] -= hands(flyer.chain, _placed(chi))[:, POSITION]
         else:
