@@ -78,7 +78,7 @@ def rows(**columns):
 
 
 def test_hover_needs_the_weight():
-    demand = checked().along(Motion(lambda t: rows()), TIMES, np.zeros(len(TIMES)))
+    demand = checked().needs.along(Motion(lambda t: rows()), TIMES, np.zeros(len(TIMES)))
     np.testing.assert_allclose(demand.thrust, 2.2 * 9.81)
     np.testing.assert_allclose(demand.tilt, 0.0)
     np.testing.assert_allclose(demand.body_rates, 0.0, atol=1e-12)
@@ -87,7 +87,7 @@ def test_hover_needs_the_weight():
 
 def test_a_constant_acceleration_tilts_by_its_ratio_to_gravity():
     motion = Motion(lambda t: rows(x=(0.0, 0.0, 9.81)))
-    demand = checked().along(motion, TIMES, np.full(len(TIMES), 0.2))
+    demand = checked().needs.along(motion, TIMES, np.full(len(TIMES), 0.2))
     np.testing.assert_allclose(demand.tilt, math.pi / 4)
     np.testing.assert_allclose(demand.thrust, 2.4 * 9.81 * math.sqrt(2.0))
 
@@ -97,7 +97,7 @@ def test_a_magnet_hangs_on_a_hinge_that_turns_by_150_deg(degrees, beyond):
     """Both links by 74 deg turn it by 148, by 80 deg by 160."""
     angle = math.radians(degrees), 0.0, 0.0
     motion = Motion(lambda t: rows(alpha_1=angle, alpha_2=angle))
-    demand = checked().along(motion, TIMES, np.zeros(len(TIMES)))
+    demand = checked().needs.along(motion, TIMES, np.zeros(len(TIMES)))
     found = [one for one in checked().exceeded(demand, 0.0) if "hinge" in one.quantity]
     assert len(found) == beyond
     for one in found:
@@ -107,7 +107,7 @@ def test_a_magnet_hangs_on_a_hinge_that_turns_by_150_deg(degrees, beyond):
 
 def test_drag_counts():
     motion = Motion(lambda t: rows(y=(0.0, 10.0, 0.0)))
-    demand = checked().along(motion, TIMES, np.zeros(len(TIMES)))
+    demand = checked().needs.along(motion, TIMES, np.zeros(len(TIMES)))
     assert demand.tilt[0] == pytest.approx(math.atan(1.5 / (2.2 * 9.81)))
 
 
@@ -124,7 +124,7 @@ def test_a_steady_circle_turns_the_thrust_about_the_vertical():
             y=(r * math.sin(w * t), r * w * math.cos(w * t), -r * w * w * math.sin(w * t)),
         )
     )
-    demand = Feasibility(no_drag, OPEN, 0.0).along(motion, TIMES, np.zeros(len(TIMES)))
+    demand = Feasibility(no_drag, OPEN, 0.0).needs.along(motion, TIMES, np.zeros(len(TIMES)))
     tilt = math.atan(r * w * w / 9.81)
     np.testing.assert_allclose(demand.tilt, tilt)
     inner = demand.body_rates[2:-2]
@@ -143,7 +143,7 @@ def test_the_change_of_the_body_rates_is_that_of_an_angle_to_and_fro():
 
     air = PROFILE.vehicle.numbers | {"air": {"drag": [0] * 3}}
     still = Feasibility(replace(PROFILE.vehicle, numbers=air), OPEN, 0.0)
-    turn = still.along(Motion(ahead), TIMES, np.zeros(len(TIMES))).turn
+    turn = still.needs.along(Motion(ahead), TIMES, np.zeros(len(TIMES))).turn
     expected = size * w**2 * np.abs(np.sin(w * TIMES)) * math.sin(0.02 * w) / (0.02 * w)
     np.testing.assert_allclose(turn[5:-5], expected[5:-5], rtol=2e-3, atol=1e-2)
 
@@ -200,7 +200,7 @@ def test_the_races_stand_every_delay_that_a_flight_is_allowed(name):
 
 def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     still = Motion(lambda t: rows(alpha_1=(math.pi / 2, 0, 0)))  # both links horizontal, forward
-    demand = checked().along(still, TIMES, np.full(len(TIMES), 0.2))
+    demand = checked().needs.along(still, TIMES, np.full(len(TIMES), 0.2))
     # link 1: 0.177 kg at 74.5 mm; link 2: 0.09 kg at 75 mm and the magnet, 0.07 kg, at its pivot,
     # 140 mm, both 100 mm further; payload at 240 mm from joint 1
     first = 9.81 * (0.177 * 0.0745 + 0.09 * 0.175 + 0.07 * 0.240 + 0.2 * 0.240)
@@ -211,7 +211,7 @@ def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
 def test_the_magnet_must_hold_the_payloads_apparent_weight():
     """0.2 kg at 10 m/s^2 upwards weigh 3.96 N; a magnet of 3 N is refused."""
     up = Motion(lambda t: rows(z=(5.0 * t * t, 10.0 * t, 10.0)))
-    demand = checked().along(up, TIMES, np.full(len(TIMES), 0.2))
+    demand = checked().needs.along(up, TIMES, np.full(len(TIMES), 0.2))
     np.testing.assert_allclose(demand.magnet_force[5:-5], 0.2 * 19.81, rtol=1e-3)
     found = checked().exceeded(demand)
     assert "force on the magnet" not in in_words(found)

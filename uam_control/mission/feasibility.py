@@ -118,7 +118,7 @@ class Feasibility:
         if not first:
             return []
         times = np.arange(0.0, max(first.values()), STEP)
-        demand = self._needs.along(scenario.trajectory(start), times, np.zeros(len(times)))
+        demand = self.needs.along(scenario.trajectory(start), times, np.zeros(len(times)))
         p = self.limits
         stands = replace(p, reference_tilt=min(p.reference_tilt, p.start_tilt))
         found = replace(self, limits=stands).exceeded(demand)
@@ -135,9 +135,9 @@ class Feasibility:
         place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
-        if self._needs.chain is not None:
-            lowest, highest = np.column_stack([p.joint_ranges, self._needs.hinge])
-            hinge = hinge_angles(self._needs.chain, np.ascontiguousarray(demand.angles))
+        if self.needs.chain is not None:
+            lowest, highest = np.column_stack([p.joint_ranges, self.needs.hinge])
+            hinge = hinge_angles(self.needs.chain, np.ascontiguousarray(demand.angles))
             angles.append(("angle of the hand's hinge", hinge))
         upper += [(*angle, highest[i], "rad") for i, angle in enumerate(angles)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
@@ -205,7 +205,8 @@ class Feasibility:
         return np.where(across, height, np.inf), np.where(lands, -velocity[:, Z], -np.inf)
 
     @cached_property
-    def _needs(self) -> Needs:
+    def needs(self) -> Needs:
+        """What references need of the vehicle."""
         return Needs(self.vehicle)
 
     @property
@@ -260,7 +261,7 @@ class Feasibility:
         best, least = None, math.inf
         for ramp in within_room(goal, np.minimum(room[0], begin), np.maximum(room[1], begin)):
             times = np.arange(0.0, ramp.length, STEP)
-            demand = self._needs.along(ramp, times, np.zeros(len(times)))
+            demand = self.needs.along(ramp, times, np.zeros(len(times)))
             used = max((values / limit).max() for _, values, limit, _ in self._motion(demand))
             if used < least and not self.exceeded(demand, STANDING):
                 best, least = ramp, used
@@ -319,7 +320,7 @@ class Feasibility:
     def _planned(self, flight: _Planned, part: slice) -> Demand:
         """Return what a part of a flight needs."""
         times = flight.times[part]
-        return self._needs.along(flight.trajectory, times, self.carried(flight.scenario, times))
+        return self.needs.along(flight.trajectory, times, self.carried(flight.scenario, times))
 
     def carried(self, scenario: Scenario, times: np.ndarray) -> np.ndarray:
         """Return the carried mass (m,) [kg] at times (m,) [s]."""
