@@ -1,7 +1,9 @@
 """The effects of a laboratory on the plant: each by hand, and what they leave alone."""
 
 import math
+from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,7 +21,7 @@ from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.downwash import momentum
 from uam_sim_bridge.plant.effects.effect import Acting, Effect, size
 from uam_sim_bridge.plant.effects.ground_effect import raise_thrust, thrust_ratio
-from uam_sim_bridge.plant.effects.joint_gear import Gear, gear_step, rigid_step
+from uam_sim_bridge.plant.effects.joint_gear import Gear, followed, gear_step, rigid_step
 from uam_sim_bridge.plant.effects.mocap_dropouts import drop
 from uam_sim_bridge.plant.effects.mocap_jitter import jitter
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
@@ -284,9 +286,39 @@ def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0, load=0.0)
     constants = np.array([0.02, 100.0, 0.0, 1.5, 0.05, 0.0, 0.002])
     angles, speeds, output = np.array([angle]), np.array([speed]), np.zeros(1)
     friction = np.array([friction]), np.array([load])
-    motors = Gear(np.array([0.01]), *friction, constants, angles, speeds)
+    motors = Gear(np.array([0.01]), *friction, constants, np.ones(1), angles, speeds)
     gear_step(motors, np.array([torque]), np.array([alpha]), np.array([alpha_dot]), output)
     return output[0], angles[0], speeds[0]
+
+
+def test_teeth_of_a_light_joint_are_as_soft_as_the_physics_step_needs():
+    """Motor 0.5, link 1.0 g m^2, 1/J = 3000: (150 h^2 + 2 0.3 h) 3000 = 5.4 at h = 2 ms, more than
+    4: 3 / 5.4 of the teeth. A light pair that is let go comes to rest; with all of them it does not.
+    """
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="0.002"/><worldbody><body><joint armature="1e-3"/>'
+        '<inertial pos="0 0 0" mass="0.1" diaginertia="1e-12 1e-12 1e-12"/>'
+        "</body></worldbody></mujoco>"
+    )
+    bench = SimpleNamespace(model=model, data=mujoco.MjData(model), arm_dofs=slice(0, 1))
+    (teeth,) = followed(bench, np.array([0.5e-3]), 150.0, 0.3)
+    assert teeth == pytest.approx(3.0 / 5.4, rel=1e-6)
+    assert followed(bench, np.array([0.5e-3]), 15.0, 0.03)[0] == 1.0
+
+    def swing(part):
+        constants = np.array([0.0, 150.0, 0.3, 1.0, 0.05, 0.0, 0.002])
+        state = np.zeros(1), np.zeros(1)
+        motors = Gear(
+            np.array([0.5e-3]), np.zeros(1), np.zeros(1), constants, np.array([part]), *state
+        )
+        angle, speed, output = np.array([0.01]), np.zeros(1), np.zeros(1)
+        for _ in range(200):
+            gear_step(motors, np.zeros(1), angle, speed, output)
+            speed += 0.002 * output / 1e-3
+            angle += 0.002 * speed
+        return abs(speed[0])
+
+    assert swing(teeth) < 0.05 < 1.0 < swing(1.0)
 
 
 def test_inside_the_play_no_torque_and_beyond_it_a_spring():
@@ -321,7 +353,9 @@ def test_a_rigid_gear_has_smooth_friction_that_never_turns_the_joint_back(speed,
     constants = np.array([0.0, 0.0, 0.0, 1.0, 0.05, 0.015, 0.002])
     own = np.array([0.01]), np.array([0.1]), np.array([0.3])
     torques = np.array([2.0])
-    rigid_step(Gear(*own, constants, np.zeros(1), np.zeros(1)), torques, np.array([speed]))
+    rigid_step(
+        Gear(*own, constants, np.ones(1), np.zeros(1), np.zeros(1)), torques, np.array([speed])
+    )
     assert torques[0] == pytest.approx(torque)
 
 

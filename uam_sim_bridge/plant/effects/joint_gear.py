@@ -13,6 +13,8 @@ spring with damping:
     J_m theta_m'' = tau_servo - tau_gear - friction
     tau_gear = k dead_zone(theta_m - alpha) + c (theta_m' - alpha'), without pull of the teeth
 
+The teeth of a joint are softer where its motor and link are too light for the physics step.
+
 Without stiffness the gear is rigid: motor and link are one mass. The servo's encoder is on the
 output shaft, so that it measures the link.
 """
@@ -22,12 +24,14 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple
 
+import mujoco
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, each, size
 
+STABLE = 3.0  # of 4, at which steps become unstable
 LINK_ARMATURE = 5e-4  # [kg m^2] left on the link: output shaft and horn
 
 
@@ -63,17 +67,19 @@ class JointGear(Effect):
             *(0.5 * math.radians(self.backlash_deg), self.stiffness, self.damping, self.stiction),
             *(self.stribeck_speed, self.width, model.opt.timestep),
         )
-        motors = Gear(
-            model.dof_armature[dofs].copy(),
-            coulomb,
-            bench.for_each("joint_gear: load", self.load, count, "joints"),
-            np.array(constants),
-            bench.angles.copy(),
-            np.zeros(count),
-        )
+        inertia = model.dof_armature[dofs].copy()
         model.dof_frictionloss[dofs] = 0.0
         if self.stiffness:
             model.dof_armature[dofs] = LINK_ARMATURE
+        motors = Gear(
+            inertia,
+            coulomb,
+            bench.for_each("joint_gear: load", self.load, count, "joints"),
+            np.array(constants),
+            followed(bench, inertia, self.stiffness, self.damping),
+            bench.angles.copy(),
+            np.zeros(count),
+        )
         arrays = motors, bench.angles, bench.data.qvel[dofs], bench.torque_control
         return Compiled(arrays, joints=act)
 
@@ -82,18 +88,37 @@ class JointGear(Effect):
             raise ParameterError("width: 0.0 with stiffness 0; a rigid gear has a width above 0")
 
 
+def followed(bench: Bench, motor: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
+    """Return the part (n,) of the teeth's stiffness and damping that the physics step can follow.
+
+    motor (n,) [kg m^2]: inertia of the motors. Motor and link, J together, are stable in steps of h
+    where k h^2 + 2 c h < 4 J; small servos with light links are not with the teeth of large ones.
+    """
+    model, data = bench.model, mujoco.MjData(bench.model)
+    data.qpos[:] = bench.data.qpos
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    link = np.diag(np.linalg.inv(mass))[bench.arm_dofs]  # 1 / J of each, the others free
+    step = model.opt.timestep
+    needed = (stiffness * step**2 + 2.0 * damping * step) * (1.0 / motor + link)
+    return np.minimum(1.0, STABLE / np.maximum(needed, 1e-9))
+
+
 class Gear(NamedTuple):
     """The motors behind the gears of n joints.
 
     inertia (n,) [kg m^2], coulomb (n,) [N m], load (n,) [1]; constants (7,): half backlash [rad],
     stiffness [N m/rad], damping [N m s/rad], stiction [1], Stribeck speed [rad/s], width [rad/s],
-    step [s]; their state: angle (n,) [rad], speed (n,) [rad/s].
+    step [s]; teeth (n,): part of stiffness and damping, see `followed`; their state: angle (n,)
+    [rad], speed (n,) [rad/s].
     """
 
     inertia: np.ndarray
     coulomb: np.ndarray
     load: np.ndarray
     constants: np.ndarray
+    teeth: np.ndarray
     angle: np.ndarray
     speed: np.ndarray
 
@@ -147,10 +172,10 @@ def gear_step(
         contact = 0.0
         if gap > half:
             contact = stiffness * (gap - half) + damping * (speed[i] - alpha_dot[i])
-            contact = max(contact, 0.0)  # teeth do not pull
+            contact = gear.teeth[i] * max(contact, 0.0)  # teeth do not pull
         elif gap < -half:
             contact = stiffness * (gap + half) + damping * (speed[i] - alpha_dot[i])
-            contact = min(contact, 0.0)
+            contact = gear.teeth[i] * min(contact, 0.0)
         free = gear.inertia[i] * speed[i] + step * (torque[i] - contact)
         speed[i] = (free + braked(gear, i, torque[i], speed[i], free)) / gear.inertia[i]
         angle[i] += step * speed[i]
