@@ -292,8 +292,9 @@ def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0, load=0.0)
 
 
 def test_teeth_of_a_light_joint_are_as_soft_as_the_physics_step_needs():
-    """Motor 0.5, link 1.0 g m^2, 1/J = 3000: (150 h^2 + 2 0.3 h) 3000 = 5.4 at h = 2 ms, more than
-    4: 3 / 5.4 of the teeth. A light pair that is let go comes to rest; with all of them it does not.
+    """Motor 0.5, link 1.0 g m^2: (150 h^2 + 2 0.3 h) 3000 = 5.4 with h = 2 ms: 3 / 5.4.
+
+    A light pair that is let go comes to rest; with all of them it does not.
     """
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><option timestep="0.002"/><worldbody><body><joint armature="1e-3"/>'

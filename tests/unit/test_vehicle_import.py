@@ -339,6 +339,19 @@ def test_the_tool_heads_where_the_base_does(tmp_path, axis):
     assert here.body("magnet").xmat[[1, 4, 7]] == pytest.approx((0.0, 1.0, 0.0), abs=1e-9)
 
 
+def test_an_arm_on_top_is_stowed_so_that_its_magnet_hangs_free(tmp_path):
+    """Straight up the magnet would have to turn by 180 degrees; its hinge ends at 150. A site has
+    no hinge: straight up is the least motion."""
+    made, model = imported(tmp_path, drone(mount=f"{math.pi} 0 0"))
+    joints = made.description.joints
+    here = posed(model, made.description.joint_names, [one.stowed for one in joints])
+    assert here.body("magnet").xmat[8] > math.cos(math.radians(150.0))
+    made, _ = imported(tmp_path, drone(mount=f"{math.pi} 0 0"), chosen=Chosen(magnet=False))
+    assert [one.stowed for one in made.description.joints] == [0.0, 0.0]
+    with pytest.raises(ImportRefused, match="'joint_0': its magnet can hang straight down in no"):
+        imported(tmp_path, drone(mount=f"{math.pi} 0 0", axes=("0 0 1",)))
+
+
 def test_of_two_arms_one_is_chosen(tmp_path):
     text = drone().replace("</robot>", SECOND_ARM)
     made, _ = imported(tmp_path, text, chosen=Chosen(arm="joint_0"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from uam_lab.importing.structure import Parts
 LEAST_MASS = 1e-6  # [kg]
 LEAST_INERTIA = 1e-9  # [kg m^2]
 FARTHEST, HEAVIEST = 5.0, 100.0  # [m] of a rotor, radius of gyration; [kg] of a link
+HINGE_DEG = 140.0  # of the magnet's hinge from the last link: 10 less than in parts/magnet.xml
 ALONG = 1e-6  # of an axis that counts as upright or forward
 SHORT = 0.01  # [m] tip from the last joint
 DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
@@ -103,6 +105,15 @@ def tip(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
     left = float(across @ axes.T @ parts.frame(0)[1][:, 1])
     y = across / (np.linalg.norm(across) if left > ALONG else -np.linalg.norm(across))
     return place, np.column_stack([np.cross(y, -along), y, -along])
+
+
+def hangs(parts: Parts) -> bool:
+    """Return whether the magnet hangs straight down within the range of its hinge, of a level base;
+    True without one."""
+    if not parts.magnet:
+        return True
+    back = parts.frame(len(parts.joints))[1] @ tip(parts)[1][:, 2]
+    return float(back @ parts.frame(0)[1][:, 2]) > math.cos(math.radians(HINGE_DEG))
 
 
 def _named(parts: Parts) -> np.ndarray:

@@ -117,7 +117,8 @@ def _stow(
     parts: Parts, ranges: list[Told], low: float, clearance: float
 ) -> tuple[np.ndarray, float]:
     """Return the joint angles (n,) [rad] in which the arm stays above the feet with little motion
-    from zero, and the arm's lowest point [m] there; without such, those of the highest arm."""
+    from zero, and its magnet hangs down freely, and the arm's lowest point [m] there; without such,
+    those of the highest arm."""
     choices = []
     for low_deg, high_deg in (one.value for one in ranges):
         inside = [a for a in STEPS_DEG if low_deg + 5.0 <= a <= high_deg - 5.0]
@@ -130,11 +131,16 @@ def _stow(
     best, highest = np.zeros(len(ranges)), -math.inf
     for pose in poses:
         geometry.set_angles(parts, np.array(pose))
+        if not geometry.hangs(parts):
+            continue
         bottom = _bottom(parts, boxes)
         if bottom - low >= clearance:
             return np.array(pose), bottom
         if bottom > highest + 0.005:
             best, highest = np.array(pose), bottom
+    if math.isinf(highest):
+        text = "its magnet can hang straight down in no pose of the arm: --no-magnet"
+        raise parts.source.error("joint", parts.model.joint(parts.joints[-1]).name, text)
     geometry.set_angles(parts, best)
     return best, highest
 
