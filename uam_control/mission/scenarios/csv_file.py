@@ -257,8 +257,8 @@ def _path(
         raise table.error(
             error.row,
             columns[error.group][0],
-            f"no smooth curve passes within {PASSES_WITHIN:g}; it is {error.distance:.3g} off here: "
-            "filter the noise, or give more rows",
+            f"no smooth curve passes within {PASSES_WITHIN:g}; it is {error.distance:.3g} off here:"
+            " filter the noise, or give more rows",
         ) from None
     for named, samples, curve in zip(columns, groups, curves, strict=True):
         _check_gaps(table, named, samples, curve)
