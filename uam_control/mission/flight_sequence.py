@@ -53,8 +53,6 @@ from uam_control.supervision import (
 from uam_control.vehicle import VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
-# landings after a hold that nobody asked for here: not where a stand is
-UNASKED = (Event.HELD_TOO_LONG, Event.CLEAR_TO_LAND)
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
@@ -109,7 +107,7 @@ class FlightSequence:
         self._end: float | None = None
         self._override = MagnetOverride()
         self._descent: Decision | None = None  # to land, while the reference makes ready for it
-        self._clear_at = 0.0  # stamp [s] at which the reference is clear of a stand, for that
+        self._clear_at: float | None = None  # stamp [s] of its arrival clear of a stand, for that
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
         self._beside: bool | None = None  # a stand, when the autopilot's own landing began
         self._ground_pose = GroundPose()
@@ -333,7 +331,7 @@ class FlightSequence:
             self._enter(stamp, before, decision)
         if decision.state is State.RELEASED or self._standing is not None:
             self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
-        if self._descent is not None and stamp >= self._clear_at and not self._guidance.fast:
+        if self._descent is not None and not self._guidance.fast:
             self._descend(stamp)
         if decision is not self._followed:
             self._followed = decision
@@ -366,7 +364,14 @@ class FlightSequence:
             guidance.give_way(stamp, seen.state[CHI, ARM])
 
     def _descend(self, stamp: float) -> None:
-        """Begin the descent of an unplanned landing, vertically from the vehicle's position."""
+        """Descend in an unplanned landing, vertically from the vehicle's position: not on a stand.
+
+        First it moves clear of one that is near.
+        """
+        if self._clear_at is None:
+            self._clear_at = self._guidance.retreat(stamp)
+        if stamp < self._clear_at:
+            return
         stow, self._descent = self._descent.stow, None
         self._guidance.descend(stamp, self._seen.state, self._ground, stow)
         self._touchdown.descend(stamp, self._guidance.end)
@@ -410,13 +415,11 @@ class FlightSequence:
         elif event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
-            self._descent = decision
+            self._descent, self._clear_at = decision, None
             if before is State.FAILSAFE:
                 guidance.stay(stamp, self._seen.state, self._ground, self._age)
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
-            if event in UNASKED:
-                self._clear_at = guidance.retreat(stamp)
         elif state is State.FAILSAFE:
             guidance.stop(stamp, decision.stow)
             self._fell_since = stamp

@@ -369,18 +369,18 @@ class Guidance:
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
     def retreat(self, stamp: float, hurried: bool = True) -> float:
-        """Move clear of an obstacle nearby, off the path and up; `go_on` returns to it.
+        """Move clear of an obstacle near the place of rest, off the path and up.
 
-        Level from below the path: straight up the arm is caught under a stand's top. hurried: with
-        brake_acceleration, else with travel_speed. Returns the stamp [s] of the arrival, `stamp`
-        where nothing is near.
+        `go_on` returns to the path. Level from below it: straight up the arm is caught under a
+        stand's top. hurried: with brake_acceleration, else with travel_speed. Returns the
+        stamp [s] of the arrival, `stamp` where nothing is near.
         """
-        way = self.clear(self.motion[CHI])
+        goal, lengths = self._at_rest(stow=False)
+        way = self.clear(goal)
         if self._below_path:
             way[Z] = 0.0
         if not np.any(way) or not self._take(Cue.RETREAT):
             return stamp
-        goal, lengths = self._at_rest(stow=False)
         goal[POSITION] += way
         p, far = self.parameters, float(np.linalg.norm(way))
         hurry = math.sqrt(HARDEST * far / p.brake_acceleration)
