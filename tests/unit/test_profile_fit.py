@@ -61,6 +61,14 @@ def test_a_plant_that_takes_most_of_the_torque_is_named(torque, left):
     assert note.startswith("standing_load: 0.") and left in note
 
 
+def test_a_battery_that_is_small_for_the_vehicle_is_named():
+    """5 A h are the S-500's: 2.2 A h is less than half; its resistance grows to 0.005 2.2 / 5."""
+    options = {"engine": "direct", "plant_preset": ["laboratory"]}
+    (note,) = settings("hover", effects=["battery_sag:capacity=2.2"], **options).notes
+    assert "2.2 A h are few for 2.2 kg" in note
+    assert note.endswith("--effect battery_sag:capacity=5,resistance=0.0022")
+
+
 def test_a_flight_with_payload_says_that_there_is_no_end_effector(monkeypatch):
     none = chain_of(S500)._replace(has_hand=0)
     monkeypatch.setattr(flight_settings, "chain_of", lambda vehicle: none)

@@ -28,7 +28,13 @@ from uam_control.vehicle import (
     chain_of,
     load_description,
 )
-from uam_lab.flights import arm_on_ground, clearance, node_options, vehicle_changes
+from uam_lab.flights import (
+    arm_on_ground,
+    clearance,
+    node_options,
+    plant_fit,
+    vehicle_changes,
+)
 from uam_lab.flights.flight_options import (
     AUTOPILOT_IMU,
     BUILTIN,
@@ -54,9 +60,7 @@ from uam_sim_bridge.mavlink.hil.hil_server import open_only_here
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
-from uam_sim_bridge.plant.effects.mismatches import RotorMismatch
 from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
-from uam_sim_bridge.plant.effects.standing_load import StandingLoad
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4 import px4_parameters
@@ -214,7 +218,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         + _about_the_arm(vehicle, scenario, mass)
         + ((about,) if about else ())
         + clearance.notes(vehicle, scenario, mass)
-        + _about_the_plant(profile, effects),
+        + plant_fit.notes(profile, effects),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, effects),
         without=tuple(dict.fromkeys(without if o.view else (*without, COCKPIT))),
@@ -266,24 +270,6 @@ def _about_the_arm(vehicle: VehicleDescription, scenario: Scenario, mass: float)
         found.append(f"{name}: arm: not used, the lengths are those of {vehicle.model.name}")
     if scenario.magnet and mass and not chain_of(vehicle).has_hand:
         found.append(f"{name} has no end effector: nothing is steered to the payload")
-    return tuple(found)
-
-
-def _about_the_plant(profile: Profile, effects: presets.Effects) -> tuple[str, ...]:
-    """Return notes about a standing torque that leaves the attitude law less than half of its own:
-    a preset's numbers are those of a vehicle of 2 to 4 kg."""
-    if StandingLoad.NAME not in effects:
-        return ()
-    most = getattr(profile.sets["attitude_controller"], "torque_max", ())
-    yaw = effects.get(RotorMismatch.NAME, {}).get("yaw", 1.0)
-    found = []
-    for axis, torque, own in zip("xyz", effects[StandingLoad.NAME]["torque"], most, strict=False):
-        left = own * yaw if axis == "z" else own
-        if abs(torque) > 0.5 * left:
-            found.append(
-                f"{StandingLoad.NAME}: {abs(torque):.3g} N m about {axis}, of {left:.3g} N m that "
-                f"{profile.vehicle.name} makes there; --effect {StandingLoad.NAME}:torque=X/Y/Z"
-            )
     return tuple(found)
 
 
