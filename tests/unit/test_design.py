@@ -120,6 +120,16 @@ def test_a_vehicle_that_its_arm_turns_over_is_refused_at_once():
         search.design(load_description("s500_arm"), criteria)
 
 
+def test_a_servo_that_friction_takes_is_refused_at_once(monkeypatch):
+    """0.08 + 1.4 N m s/rad at 1 rad/s are 1.48 of 2.8 N m, more than half."""
+    braked = search.chain_of(load_description("s500_arm"))._replace(damping=np.array([0.02, 1.4]))
+    monkeypatch.setattr(search, "chain_of", lambda described: braked)
+    with pytest.raises(
+        DesignError, match=r"alpha_2: friction 0.08 N m, .* take 1.5 N m .*of 2.8 N m"
+    ):
+        search.design(load_description("s500_arm"), load_criteria())
+
+
 def test_inertia_of_a_vehicle_over_the_poses():
     """The joint's inertia with all weight at the ends is what a pendulum has; poses are corners."""
     middle, joints, poses = inertias(Vehicle.load("s500_arm"))

@@ -20,7 +20,7 @@ import numpy as np
 from uam_control.coordinates import PITCH, ROLL, YAW, Z
 from uam_control.estimation import EstimatorParameters
 from uam_control.profiles.profile import Profile, ProfileError, profile_of
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import VehicleDescription, chain_of
 from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.design.facts import Facts, payload, standing_torque
 from uam_lab.experiments.design.gains import (
@@ -38,6 +38,7 @@ from uam_lab.experiments.margins.stack_model import Stack, stack_model
 from uam_sim_bridge.plant import Vehicle
 
 STEP, ROUNDS = 0.92, 40
+BRAKED, BRAKED_SPEED = 0.5, 1.0  # of the effort limit that friction may take, at [rad/s]
 RATES = "rate loop"
 OBSERVED = 0.23  # periods of its bandwidth, by which the observer's velocity of a joint is late
 ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
@@ -116,6 +117,7 @@ class Search:
         vehicle = Vehicle.of(described)
         self.facts = Facts.of(vehicle)
         self._refuse_unbalanced(vehicle)
+        self._refuse_braked()
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
@@ -139,6 +141,19 @@ class Search:
                         f"{one:.2g} N m in {name}, the attitude controller may give {most:.2g}: a "
                         "lighter arm or smaller range, or rotors farther out or stronger"
                     )
+
+    def _refuse_braked(self) -> None:
+        """Raise DesignError where friction takes more than BRAKED of a servo's torque."""
+        described, chain = self._described, chain_of(self._described)
+        for i, (joint, servo) in enumerate(zip(described.joints, described.servos, strict=True)):
+            lost = float(chain.friction[i] + BRAKED_SPEED * chain.damping[i])
+            if lost > BRAKED * servo.effort_limit:
+                raise DesignError(
+                    f"{described.name}: {joint.name}: friction {chain.friction[i]:g} N m, damping "
+                    f"{chain.damping[i]:g} N m s/rad of {described.model.name} take {lost:.2g} N m "
+                    f"at {BRAKED_SPEED:g} rad/s, of {servo.effort_limit:g} N m; "
+                    f"{100 * BRAKED:g} % are possible: a stronger servo"
+                )
 
     def bandwidths(self) -> Bandwidths:
         """Return the bandwidths: what the formulas allow, times the share of each loop."""
