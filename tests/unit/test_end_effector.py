@@ -157,6 +157,16 @@ def test_an_arm_that_turns_about_the_vertical_holds_its_heading_too():
     assert np.ptp(flown.chi[:, 0]) == pytest.approx(0.1, abs=2e-3)
 
 
+def test_a_joint_without_room_about_zero_works_about_its_middle():
+    """20 to 110 degrees: the posture was looked for at 0, and refused as out of this range."""
+    mine = load_description()
+    low, high = math.radians(20.0), math.radians(110.0)
+    joints = mine.joints[0], replace(mine.joints[1], low=low, high=high)
+    motion = load_scenario("ee_circle_020", replace(mine, joints=joints)).route.path
+    angles = motion.rows(np.linspace(0.0, motion.length, 100), 1)[:, 0, 7]
+    assert low < angles.min() and angles.max() < high
+
+
 def test_a_hand_that_heads_backward_is_on_its_task(tmp_path):
     """Its frame is turned by half a turn: the base heads against the path, and is solved for."""
     shutil.copytree(path("vehicle/parts"), tmp_path / "parts")

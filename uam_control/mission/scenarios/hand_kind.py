@@ -267,10 +267,14 @@ class _Reader:
         """Return `arm_deg` [rad], or a posture in which every joint has room for `swing` [rad]."""
         if "arm_deg" in self._entry.values:
             return np.radians(self._entry.numbers("arm_deg", len(self._names)))
-        room = np.array([max(0.0, min(-low, high) - swing - FREE) for low, high in self._ranges])
+        rooms = []
+        for low, high in self._ranges:  # about zero; of a joint without room there, its middle
+            middle = 0.0 if min(-low, high) > swing + FREE else (low + high) / 2.0
+            half = max(0.0, min(middle - low, high - middle) - swing - FREE)
+            rooms.append((middle - half, middle + half))
         low, high = self._flyer.hinge
         hinge = low + swing + FREE, high - swing - FREE
-        return working_posture(self._flyer.chain, self._vehicle.stowed, -room, room, hinge)
+        return working_posture(self._flyer.chain, self._vehicle.stowed, *np.array(rooms).T, hinge)
 
     def _sweep(self, one: Section) -> dict[str, Any]:
         """Return a swing with joint and amplitude; default: the first joint that lifts the hand."""
