@@ -85,6 +85,7 @@ def test_no_limit_takes_a_released_vehicle_from_the_pilot(seen):
     [
         ({}, State.HOLDING),
         ({"on_ground": True}, State.DISARMED),
+        ({"on_ground": True, "state": with_state((0, 4), 0.25).state}, State.HOLDING),  # it tilts
         ({"authority": Authority(landed=True)}, State.DISARMED),
         ({"armed": False}, State.DISARMED),
     ],

@@ -15,9 +15,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from uam_control.coordinates import CHI, Z
+from uam_control.coordinates import ATTITUDE, CHI, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
+from uam_control.maths.rotations import tilt
 from uam_control.supervision.checks import (
     CONTRADICTION,
     DELAYS,
@@ -33,6 +34,7 @@ from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, E
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 TOO_HEAVY = "no lift-off: too little thrust for the weight"
+LEVEL = 0.15  # [rad] tilt up to which a vehicle stands: beyond it turns over without its motors
 NOT_FOLLOWED = "no lift-off: the autopilot is silent, or lands by itself"
 
 
@@ -144,7 +146,7 @@ class Supervisor:
             return f"{holder} has control"
         if self.state is State.RELEASED and command is OperatorCommand.RESUME:
             event = Event.REGAINED  # the autopilot is asked first
-            if seen.on_ground or seen.authority.landed:
+            if _stands(seen):
                 return "on the ground: disarm, then start a new flight"
         on_path = self.state is State.FLYING and not seen.off_path
         if (self.state, event) not in TARGETS or (event is Event.RESUME and on_path):
@@ -214,8 +216,7 @@ class Supervisor:
             if self._arm:
                 yield Event.GIVEN_UP, _in_control(seen.authority.released_to)
         elif self.state is State.RELEASED:
-            grounded = seen.on_ground or seen.authority.landed
-            event = Event.REGAINED_ON_GROUND if grounded else Event.REGAINED
+            event = Event.REGAINED_ON_GROUND if _stands(seen) else Event.REGAINED
             yield event, event.value
         failed = f"bridge: {seen.authority.failed}" if seen.authority.failed else ""
         if failed and self._arm:
@@ -356,6 +357,12 @@ def stays_behind(supervisor: np.ndarray, stamp: float, planned: float) -> bool:
         return False
     m.left_behind = min(m.left_behind, stamp)
     return stamp - m.left_behind >= m.liftoff_timeout
+
+
+def _stands(seen: Observation) -> bool:
+    """Return whether a released vehicle stands on the ground."""
+    low = seen.on_ground and tilt(seen.state[CHI, ATTITUDE]) < LEVEL
+    return low or seen.authority.landed
 
 
 def _in_control(released_to: str) -> str:
