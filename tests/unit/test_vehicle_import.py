@@ -12,8 +12,9 @@ import pytest
 import yaml
 from urdf_texts import drone, inertial, joint
 
+from uam_control.arm.hand import hinge_angles
 from uam_control.settings.configuration import path
-from uam_control.vehicle import load_description
+from uam_control.vehicle import chain_of, load_description
 from uam_lab.cli.parser import parsed, run
 from uam_lab.importing import importer
 from uam_lab.importing.answers import Answers, read_answers
@@ -346,6 +347,10 @@ def test_an_arm_on_top_is_stowed_so_that_its_magnet_hangs_free(tmp_path):
     joints = made.description.joints
     here = posed(model, made.description.joint_names, [one.stowed for one in joints])
     assert here.body("magnet").xmat[8] > math.cos(math.radians(150.0))
+    chain = chain_of(made.description)
+    turned = np.radians([[60.0, 0.0], [-60.0, 0.0], [30.0, 60.0], [-90.0, -30.0]])
+    hinge = np.abs(hinge_angles(chain, turned))  # it hangs to the side to which the arm turns
+    assert np.degrees(hinge) == pytest.approx([120.0, 120.0, 90.0, 60.0])
     made, _ = imported(tmp_path, drone(mount=f"{math.pi} 0 0"), chosen=Chosen(magnet=False))
     assert [one.stowed for one in made.description.joints] == [0.0, 0.0]
     with pytest.raises(ImportRefused, match="'joint_0': its magnet can hang straight down in no"):

@@ -36,6 +36,7 @@ LEAN = 5  # a further one of TOOL: of the tool's y axis above the horizontal [ra
 TOOL = (*HAND, LEAN)
 STEP = 1e-6  # [rad] of numerical derivatives
 NONE = 1e-9  # relative, of a singular value that counts as zero
+UP = 1e-3  # [rad] of the hinge of an arm that points up, from half a turn
 UPRIGHT = 0.9  # of the z component of a joint's axis, from which on it is a yaw joint
 # relative to the slopes' squared size; absolute, for slopes of zero
 DAMPING, LEAST = 1e-9, 1e-30
@@ -121,7 +122,8 @@ def hinge_angles(chain: Chain, angles: np.ndarray) -> np.ndarray:
     """Return where the hinge stands (m,) [rad] on which a hand hangs, of a level base.
 
     angles (m, n) [rad]. Counted from the arm at zero on without a jump: an arm that turns over in
-    one direction takes a hinge over its end, not past it. 0 for a hand that does not hang.
+    one direction takes a hinge over its end, not past it. An arm that points up at zero hangs to
+    the side to which it turns. 0 for a hand that does not hang.
     """
     found, axis = np.zeros(len(angles)), vector(chain.swing_axis)
     if dot(axis, axis) == 0.0:
@@ -134,7 +136,10 @@ def hinge_angles(chain: Chain, angles: np.ndarray) -> np.ndarray:
         rolled = 0.0
         for k in range(angles.shape[1]):
             rolled -= angles[i, k] * dot(axis, vector(chain.axes[k]))
-        found[i] = rolled + wrapped(found[i] - rolled)
+        first = wrapped(found[i] - rolled)  # of the arm at zero
+        if abs(first) > math.pi - UP:
+            first = -math.copysign(math.pi, rolled)
+        found[i] = rolled + first
     return found
 
 
