@@ -20,7 +20,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
 from uam_control.stages.control_tick import ControlTick
 from uam_lab.experiments.duel import flights
-from uam_lab.experiments.duel.report import mean
+from uam_lab.experiments.duel.flights import mean
 from uam_lab.experiments.trials.trial import Trial
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.templates import markdown_table

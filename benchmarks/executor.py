@@ -23,8 +23,8 @@ from rclpy.node import Node
 
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import TrajectoryWriter
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.executor import LeanExecutor
 
 TOPICS = (topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND)

@@ -29,7 +29,7 @@ from uam_control.arm.hand import HEADING, reach, tools
 from uam_control.coordinates import ARM, CHI, POSITION, YAW, Z
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.hand_goals import HandPose, HandTwist, base_room, joint_room
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.supervision import State
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.flight_settings import settings

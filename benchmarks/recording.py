@@ -7,7 +7,7 @@ Takes the messages of a recorded flight. Two questions, two ratios, CPU time on 
 - writing: `mcap.writer.Writer` against the least that any writer in Python does (a packed header,
   the message, compression, no index). The difference, times the messages of a second of flight,
   is what a writer of our own could save.
-- decoding: `mcap_ros2` and `rclpy`, message by message, against `recording.cdr`, a topic at a time.
+- decoding: `mcap_ros2` and `rclpy`, message by message, against `logged_topics`, a topic at a time.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory
 
-from uam_lab.records.recording import cdr
+from uam_lab.records.recording import logged_topics
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_lab.records.recording.mcap_reader import TopicLog, read_log
-from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import type_name
 
@@ -109,7 +109,7 @@ def main() -> None:
         )
     ours, by_mcap, by_rclpy = best(
         options.runs,
-        lambda: cdr.read(name, messages),
+        lambda: logged_topics.read_blocks(name, messages),
         lambda: [decode(data) for data in messages],
         lambda: [deserialize_message(data, JointTrajectory) for data in messages],
     )
@@ -119,7 +119,7 @@ def main() -> None:
     cost = 1e6 * library / len(flown)
     print(f"writing   {cost:.2f} us a message by mcap, {library / least:.1f} x the least")
     print(f"          {rate:.0f} messages a second of flight: {share:.1f} % of a core to save")
-    print(f"decoding  {1e6 * ours / len(messages):.2f} us a message by recording.cdr")
+    print(f"decoding  {1e6 * ours / len(messages):.2f} us a message by logged_topics")
     print(f"          mcap_ros2 {by_mcap / ours:.0f} x, rclpy {by_rclpy / ours:.0f} x that")
 
 

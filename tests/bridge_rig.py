@@ -13,9 +13,8 @@ from uam_control.frames import swap_body
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
-from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.convert import PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.ros_time import nanoseconds
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer

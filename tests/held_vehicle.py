@@ -11,7 +11,7 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
-from uam_lab.preflight.checklist.samples import GyroIntegral, Sample, rotation_vector
+from uam_lab.preflight.checklist.observation import GyroIntegral, Sample, rotation_vector
 from uam_lab.preflight.checklist.step import Situation, StepState
 
 PERIOD = 0.04  # [s] between two samples

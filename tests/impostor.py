@@ -23,8 +23,8 @@ from uam_msgs_py.messages.convert import (
     JointStateWriter,
     PoseWriter,
     SetpointWriter,
+    TrajectoryWriter,
 )
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 LOOP = (
     *(topics.IMU, topics.JOINTS, topics.MOCAP, topics.STATE, topics.REFERENCE),

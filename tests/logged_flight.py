@@ -5,13 +5,17 @@ from rclpy.serialization import serialize_message
 
 from uam_control.coordinates import coordinates
 from uam_control.stamps import SECOND
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
-from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
-from uam_msgs_py.messages.convert import JointStateWriter, PoseWriter, SetpointWriter
+from uam_msgs_py.messages.convert import (
+    JointStateWriter,
+    PoseWriter,
+    SetpointWriter,
+    TrajectoryWriter,
+)
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -6,9 +6,8 @@ from std_srvs.srv import SetBool, Trigger
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.convert import JointStateWriter, PoseWriter
+from uam_msgs_py.messages.convert import JointStateWriter, PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 COORDINATES = coordinates(2)
 

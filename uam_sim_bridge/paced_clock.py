@@ -1,4 +1,4 @@
-"""Ticks against the wall clock: when a tick is due, and which wall time it has.
+"""Ticks and waits against the wall clock: when a tick is due, which time it has, when a wait ends.
 
 A plant that is late runs a little faster until it is on time again, but not in a burst: the other
 nodes could not follow. One that is late by more than `latest` lets this time go: the world has then
@@ -15,6 +15,7 @@ from collections.abc import Callable
 CATCH_UP = 2.0  # [1] fastest rate after a stall, of a rehearsal
 SHORTEST = 0.0005  # [s] a sleep takes longer than shorter ones
 LATEST = 0.02  # [s] lateness that such an autopilot does not notice
+SLICE = 0.5  # s, most that counts between two readings of `left`
 
 
 class PacedClock:
@@ -63,3 +64,28 @@ class PacedClock:
         if late > self._latest:
             self._origin += late
             self.lost += late
+
+
+class Patience:
+    """Time limit of `seconds` of wall time.
+
+    A stopped virtual machine or a suspended laptop also stops the process that is waited for.
+    Between two readings of `left` at most SLICE counts, so the wait continues after such a pause.
+    """
+
+    def __init__(self, seconds: float):
+        self._left = seconds
+        self._read = time.monotonic()
+
+    @property
+    def left(self) -> float:
+        """Return the seconds left, at least 0. Read it more often than every SLICE."""
+        now = time.monotonic()
+        self._left = max(0.0, self._left - min(now - self._read, SLICE))
+        self._read = now
+        return self._left
+
+    @property
+    def over(self) -> bool:
+        """Return whether no time is left."""
+        return self.left == 0.0

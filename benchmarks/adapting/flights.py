@@ -16,7 +16,7 @@ from adapting import law_terms
 from adapting.description import Condition, Study
 from uam_control.coordinates import ARM, ATTITUDE
 from uam_control.profiles.profile import Profile
-from uam_lab.experiments.trials.inputs import inputs
+from uam_lab.experiments.trials.carried import inputs
 from uam_lab.experiments.trials.outcome import LOST, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded

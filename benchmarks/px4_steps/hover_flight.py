@@ -19,8 +19,7 @@ from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
-from uam_control.setpoints.targets import AttitudeTarget
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink

@@ -18,8 +18,8 @@ from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.node_environment import transport_environment
 from uam_lab.records.results import timeseries
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.node.polling import listen
 
 NODES = ("position_controller", "attitude_controller", "arm_controller", "state_estimator")

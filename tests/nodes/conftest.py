@@ -15,7 +15,7 @@ from rclpy.node import Node
 
 from uam_lab.flights.processes.node_environment import ros_environment
 from uam_msgs_py.messages.serialized import stays_serialized
-from uam_msgs_py.node.connections import READERS, WRITERS, Connections
+from uam_msgs_py.node.wiring import READERS, WRITERS, Connections
 from uam_sim_bridge.ports import Reservation
 
 PATIENCE = 60.0  # s, time limit of a wait

@@ -8,10 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_lab.flights.ros.status_listener import StatusListener
-from uam_lab.flights.ros.supervise import ChangedParameters
+from uam_lab.flights.ros.supervise import ChangedParameters, StatusListener
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 

@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import arm_coordinates
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import read_items
+from uam_msgs_py.messages.checklist import preflight_message, read_items
 from uam_msgs_py.messages.convert import (
     ImuWriter,
     JointStateWriter,
@@ -24,7 +24,6 @@ from uam_msgs_py.messages.convert import (
     SetpointWriter,
 )
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
-from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, RadioState
 
 MODULE = "uam_lab.preflight.checklist_node"

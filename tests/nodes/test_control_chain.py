@@ -23,12 +23,16 @@ from uam_msgs_py.messages.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_joint_command
+from uam_msgs_py.messages.convert import (
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    TrajectoryWriter,
+    read_joint_command,
+)
 from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
-from uam_msgs_py.node.connections import READERS, WRITERS, Connections
-from uam_msgs_py.node.wiring import BRIDGE
+from uam_msgs_py.node.wiring import BRIDGE, READERS, WRITERS, Connections
 
 COORDINATES = coordinates(2)
 JOINTS = arm_coordinates(2)

@@ -9,9 +9,8 @@ from free_port import free_port
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 COORDINATES = coordinates(2)
 SIZE = len(COORDINATES)

@@ -13,9 +13,8 @@ from rclpy.parameter import Parameter
 from uam_lab.flights.ros.node_arguments import FUSED, MODULES
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_state
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node import wiring
 
 PERIOD = 4_000_000  # [ns]

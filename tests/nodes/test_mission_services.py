@@ -12,11 +12,10 @@ from vehicle_rig import PERIOD, Vehicle, take_off
 
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import checklist_message
+from uam_msgs_py.messages.checklist import checklist_message, read_preflight
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.preflight import read_preflight
+from uam_msgs_py.messages.convert import TrajectoryWriter
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 
 @pytest.fixture

@@ -12,14 +12,13 @@ from std_msgs.msg import Bool
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.convert import PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.status import ERROR
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node import polling, sole_publisher
-from uam_msgs_py.node.connections import READERS, Connections
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.rightful import RightfulNodes
+from uam_msgs_py.node.wiring import READERS, Connections
 
 PERIOD = 4_000_000
 NAMES = coordinates(2)

@@ -18,8 +18,8 @@ from uam_msgs_py.messages.convert import SetpointWriter
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.serialized import type_name
-from uam_msgs_py.messages.transforms import transforms_message
-from uam_msgs_py.node.connections import WRITERS, Connections
+from uam_msgs_py.messages.tf_message import transforms_message
+from uam_msgs_py.node.wiring import WRITERS, Connections
 
 MODULE = "uam_lab.records.recorder"
 TICK = 4_000_000

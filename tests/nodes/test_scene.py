@@ -8,13 +8,12 @@ from sensor_msgs.msg import JointState
 
 from uam_control.coordinates import coordinates
 from uam_lab.cockpit.scene import HAND_NAMES
-from uam_lab.records.recording.message_definitions import schema
+from uam_lab.records.recording.bag import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
-from uam_msgs_py.messages.convert import PoseWriter, read_joints
+from uam_msgs_py.messages.convert import PoseWriter, TrajectoryWriter, read_joints
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
-from uam_msgs_py.node.connections import READERS, Connections
+from uam_msgs_py.node.wiring import READERS, Connections
 
 COORDINATES = coordinates(2)
 SIZE = len(COORDINATES)

@@ -13,8 +13,7 @@ from uam_lab.experiments.budget.path import tick_path
 from uam_lab.flights.ros.node_arguments import FUSED
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, TrajectoryWriter
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.tick_times import PARTS, read_tick_times
 

@@ -21,10 +21,9 @@ from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
-from uam_msgs_py.messages.convert import read_joints
+from uam_msgs_py.messages.convert import TrajectoryWriter, read_joints
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.messages.parameter_changes import ParameterChange
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.tunable import TunableNode
 
 COORDINATES = coordinates(2)

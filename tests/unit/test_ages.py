@@ -8,7 +8,7 @@ from uam_control.estimation.pose_clock import PoseClock
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.offboard.sequence import LINK_GAP
 from uam_control.setpoints.level_hold import HoldParameters
-from uam_control.stages.autopilot_report import REPORT_PERIOD
+from uam_control.stages.autopilot_port import REPORT_PERIOD
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.vehicle.loading import LONGEST_PERIOD
 from uam_sim_bridge.autopilot import autopilot_estimator

@@ -10,7 +10,7 @@ import yaml
 from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleError, load_description
-from uam_lab.flights import arm_on_ground
+from uam_lab.flights import clearance
 from uam_lab.flights.flight_settings import settings
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.arm_geometry import room_below
@@ -50,10 +50,10 @@ def test_a_scenario_that_stands_on_its_arm_is_refused(tmp_path, text, message):
     file.write_text(text)
     scenario = load_scenario(str(file))
     if not message:
-        arm_on_ground.check(S500, scenario)
+        clearance.check_standing(S500, scenario)
         return
     with pytest.raises(ScenarioError, match=message) as error:
-        arm_on_ground.check(S500, scenario)
+        clearance.check_standing(S500, scenario)
     assert "\n" not in str(error.value)
 
 
@@ -87,7 +87,7 @@ def test_an_mjcf_without_feet_is_not_judged(tmp_path):
         tmp_path, lambda numbers: numbers["joints"][1].update(stowed_deg=0), no_feet
     )
     assert room(vehicle, 0, 0) is None
-    arm_on_ground.check(vehicle, load_scenario("hover", vehicle))
+    clearance.check_standing(vehicle, load_scenario("hover", vehicle))
 
 
 FOOT = 'pos="0.1 0.1 -0.2" contype="2" conaffinity="5" mass="0"'
@@ -134,6 +134,6 @@ def test_every_vehicle_and_scenario_here_stands_on_its_feet(name):
             loaded = load_scenario(scenario, vehicle)
         except ScenarioError:
             continue  # for another arm
-        arm_on_ground.check(vehicle, loaded)
+        clearance.check_standing(vehicle, loaded)
         flown += 1
     assert flown > 5

@@ -34,7 +34,7 @@ from uam_lab.records.recording.bag import (
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import type_name
-from uam_msgs_py.messages.transforms import Transform, transforms_message
+from uam_msgs_py.messages.tf_message import Transform, transforms_message
 
 SECOND = 10**9
 FOREVER = QosTime(9223372036, 854775807)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import MEGABYTE, BoundedLog
-from uam_lab.records.recording.message_definitions import schema
 
 NAME = "std_msgs/msg/String"
 

@@ -14,7 +14,7 @@ from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.vehicle import derived_parameters, load_description
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import SwitchingParameters
 from uam_sim_bridge.mavlink.telemetry.parameter_check import differences, expected
 
 BRIDGE = yaml.safe_load(path("bridge/bridge.yaml").read_text())["mavlink_bridge"]["ros__parameters"]

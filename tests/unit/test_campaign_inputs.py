@@ -14,7 +14,7 @@ from uam_lab.cli import faults
 from uam_lab.cli.campaign import usual_ranges
 from uam_lab.cli.command import given_profile
 from uam_lab.cli.parser import parsed
-from uam_lab.experiments.trials.inputs import inputs
+from uam_lab.experiments.trials.carried import inputs
 
 
 @pytest.fixture

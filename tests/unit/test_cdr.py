@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_lab.records.recording import cdr
+from uam_lab.records.recording import logged_topics
 
 serialization = pytest.importorskip("rclpy.serialization")
 serialize = serialization.serialize_message
@@ -49,7 +49,7 @@ def test_any_trajectory_is_decoded(names, lengths, frame, data):
     messages = [serialize(trajectory(k, names, rows, frame)) for k in range(3)]
     size = max(map(len, messages))  # the serializer may append bytes that mean nothing
     padded = [message.ljust(size, b"\xaa") for message in messages]
-    (block,) = cdr.read("trajectory_msgs/msg/JointTrajectory", padded)
+    (block,) = logged_topics.read_blocks("trajectory_msgs/msg/JointTrajectory", padded)
     assert block.names == names
     assert block.stamps.tolist() == [k * 10**9 + k + 1 for k in range(3)]
     assert block.fields["time_from_start"].tolist() == [-k * 10**9 + k for k in range(3)]
@@ -72,7 +72,9 @@ def test_layouts_that_alternate_are_distinguished():
         trajectory(3, arm, [[3.0, 4.0], [], [], []]),
         trajectory(4, [], None),
     ]
-    blocks = cdr.read("trajectory_msgs/msg/JointTrajectory", [serialize(m) for m in messages])
+    blocks = logged_topics.read_blocks(
+        "trajectory_msgs/msg/JointTrajectory", [serialize(m) for m in messages]
+    )
     by_names = {tuple(block.names): block for block in blocks}
     assert by_names[tuple(arm)].order.tolist() == [1, 3]
     assert by_names[tuple(arm)].fields["positions"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
@@ -88,7 +90,7 @@ def test_states_poses_and_twists():
     state = JointState(
         header=header(1), name=["a", "bc"], position=[1.0, 2.0], velocity=[], effort=[3.0, 4.0]
     )
-    (block,) = cdr.read("sensor_msgs/msg/JointState", [serialize(state)])
+    (block,) = logged_topics.read_blocks("sensor_msgs/msg/JointState", [serialize(state)])
     assert block.names == ["a", "bc"] and set(block.fields) == {"position", "effort"}
     assert block.fields["effort"].tolist() == [[3.0, 4.0]]
     pose = PoseStamped(
@@ -97,14 +99,14 @@ def test_states_poses_and_twists():
             position=Point(x=1.0, y=2.0, z=3.0), orientation=Quaternion(x=0.1, y=0.2, z=0.3, w=0.4)
         ),
     )
-    (block,) = cdr.read("geometry_msgs/msg/PoseStamped", [serialize(pose)])
+    (block,) = logged_topics.read_blocks("geometry_msgs/msg/PoseStamped", [serialize(pose)])
     assert block.fields["position"].tolist() == [[1.0, 2.0, 3.0]]
     assert block.fields["orientation"].tolist() == [[0.1, 0.2, 0.3, 0.4]]
     twist = TwistStamped(
         header=header(3),
         twist=Twist(linear=Vector3(z=0.5), angular=Vector3(x=1.0, y=2.0, z=3.0)),
     )
-    (block,) = cdr.read("geometry_msgs/msg/TwistStamped", [serialize(twist)])
+    (block,) = logged_topics.read_blocks("geometry_msgs/msg/TwistStamped", [serialize(twist)])
     assert block.fields["linear"].tolist() == [[0.0, 0.0, 0.5]]
     assert block.fields["angular"].tolist() == [[1.0, 2.0, 3.0]]
     assert block.stamps.tolist() == [3_000_000_004]

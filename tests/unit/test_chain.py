@@ -9,11 +9,13 @@ import pytest
 from random_chains import in_pinocchio, pin, random_chain, unit
 
 from uam_control.arm.chain import ChainParameters, as_parameters, carrying
-from uam_control.arm.dynamics import gravity_torque, inverse_dynamics, mass_matrix
 from uam_control.arm.kinematics import (
     DOWN,
+    gravity_torque,
     hand_jacobian,
     hand_pose,
+    inverse_dynamics,
+    mass_matrix,
     vehicle_centre,
 )
 from uam_control.settings.parameter_set import ParameterError

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
-from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.guided import ConfirmStep, KillStep, MagnetStep, guided
 from uam_lab.preflight.checklist.host import HostReader, governors
 from uam_lab.preflight.checklist.limits import ChecklistParameters
@@ -24,11 +23,11 @@ from uam_lab.preflight.checklist.observation import (
     Observation,
     PreArmLine,
     Resting,
+    Sample,
     Stream,
     StreamReport,
 )
-from uam_lab.preflight.checklist.samples import Sample
-from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
+from uam_lab.preflight.checklist.step import CONFIRM, Finding, Situation, StepState
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message, read_items
 from uam_msgs_py.messages.status import ChecklistState, RadioState
 

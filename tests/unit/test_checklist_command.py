@@ -5,7 +5,7 @@ import io
 import pytest
 
 from uam_lab.cli import checklist
-from uam_lab.cli.checklist_view import drawn
+from uam_lab.cli.checklist import drawn
 from uam_lab.cli.keys import Keys
 from uam_lab.records.results.terminal import Terminal
 from uam_msgs_py.messages.checklist import ChecklistItem

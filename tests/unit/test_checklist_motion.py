@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector
 from uam_lab.preflight.checklist.checklist import Checklist
-from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.motion_step import MotionStep
-from uam_lab.preflight.checklist.samples import Window
-from uam_lab.preflight.checklist.step import Situation, StepState
+from uam_lab.preflight.checklist.observation import Window
+from uam_lab.preflight.checklist.step import Finding, Situation, StepState
 
 LIMITS = ChecklistParameters()
 JOINTS = ("alpha_1", "alpha_2")

@@ -13,8 +13,8 @@ from followed_reference import VEHICLE, P
 
 from uam_lab.cockpit.hand_marker import HandMarker, Reach
 from uam_lab.cockpit.vehicle_view import VehicleView
+from uam_msgs_py.messages.tf_message import Transform
 from uam_msgs_py.messages.topics import WORLD
-from uam_msgs_py.messages.transforms import Transform
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -14,9 +14,9 @@ import uam_lab.cockpit
 from uam_control.supervision import PreflightCheck, State
 from uam_lab.cockpit import web
 from uam_lab.cockpit.commands import BUTTONS, Commands, goal_of, question, refusal
-from uam_lab.cockpit.plain_page import HEADER, PlainPage
 from uam_lab.cockpit.texts import shown
 from uam_lab.cockpit.vehicle_health import Health
+from uam_lab.cockpit.web import HEADER, PlainPage
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 
 BY_NAME = {button.label: button for button in BUTTONS}

@@ -14,11 +14,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
-from uam_lab.cockpit.checklist_panel import ChecklistPanel, checklist_html
 from uam_lab.cockpit.gains import axes, bounds, reach, text_of, value_of
-from uam_lab.cockpit.headline import _facts, headline
+from uam_lab.cockpit.headline import ChecklistPanel, _facts, checklist_html, headline
 from uam_lab.cockpit.page import BUTTONS
-from uam_lab.cockpit.remote_parameters import About
+from uam_lab.cockpit.services import About
 from uam_lab.cockpit.vehicle_health import (
     BAD,
     CAUTION,
@@ -40,8 +39,8 @@ from uam_msgs_py.messages.status import (
     MissionStatus,
     diagnostic,
 )
+from uam_msgs_py.messages.tf_message import Transform, read_transforms, transforms_message
 from uam_msgs_py.messages.topics import WORLD
-from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as mavlink2
 from uam_control.frames import swap_quaternion, swap_world
 from uam_control.offboard.firmware import FIRMWARES
 from uam_control.offboard.modes import MavCmd, MavResult, Mode
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import VisionPose
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import covariance, vision_message

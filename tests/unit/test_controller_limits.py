@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from uam_control.control.around_law import RotorLead, lead_force
 from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
@@ -19,7 +20,6 @@ from uam_control.control.output_limits import (
     take_known_load,
     wash_out,
 )
-from uam_control.control.rotor_lead import RotorLead, lead_force
 from uam_control.settings.parameter_set import ParameterError
 
 A = math.atan2(0.6, 0.8)  # tan A = .75

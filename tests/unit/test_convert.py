@@ -33,6 +33,7 @@ from uam_msgs_py.messages.convert import (
     JointStateWriter,
     PoseWriter,
     SetpointWriter,
+    TrajectoryWriter,
     read_imu,
     read_joint_command,
     read_joints,
@@ -42,7 +43,6 @@ from uam_msgs_py.messages.convert import (
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.serialized import LAYOUTS
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 COORDINATES = coordinates(2)
 JOINTS = arm_coordinates(2)

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from uam_lab.records.recording import core_offers
-from uam_lab.records.recording.core_offers import AT_ONCE, LONG, CoreOffers
+from uam_lab.records.recording import topic_recorder
+from uam_lab.records.recording.topic_recorder import AT_ONCE, LONG, CoreOffers
 
 
 @pytest.fixture
@@ -17,8 +17,8 @@ def core(monkeypatch):
         core.offers += 1
         core.now += core.kept
 
-    monkeypatch.setattr(core_offers.os, "sched_yield", offered)
-    monkeypatch.setattr(core_offers.time, "perf_counter", lambda: core.now)
+    monkeypatch.setattr(topic_recorder.os, "sched_yield", offered)
+    monkeypatch.setattr(topic_recorder.time, "perf_counter", lambda: core.now)
     return core
 
 

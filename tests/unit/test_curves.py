@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission.scenarios import curves
-from uam_control.mission.scenarios.minimum_snap import minimum_snap, shares
+from uam_control.mission.scenarios.reference_kinds import minimum_snap, shares
 
 MIDDLE = np.array([0.5, -0.5, 1.2, 0.0, 0.0, 0.25, 0.0, 1.5])
 

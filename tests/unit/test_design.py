@@ -25,10 +25,9 @@ from uam_lab.experiments.design.facts import (
     noise_gains,
     standing_torque,
 )
-from uam_lab.experiments.design.gains import thrust_response
-from uam_lab.experiments.design.rate_loop import rate_loop
-from uam_lab.experiments.margins.kept import missed
-from uam_lab.experiments.margins.margins import Margins
+from uam_lab.experiments.design.gains import rate_loop, thrust_response
+from uam_lab.experiments.margins.cases import missed
+from uam_lab.experiments.margins.linear import Margins
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.plant import Vehicle
 

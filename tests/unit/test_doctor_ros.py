@@ -3,7 +3,7 @@
 import pytest
 
 from uam_control.settings import configuration
-from uam_lab.preflight.doctor import environment, ros
+from uam_lab.preflight.doctor import ros
 from uam_lab.preflight.doctor.check_process import Said
 from uam_lab.preflight.doctor.finding import Verdict
 from uam_sim_bridge.ports import Reservation
@@ -35,13 +35,13 @@ OK, WARN, FAIL = Verdict
     ],
 )
 def test_a_variable_that_is_set_is_judged_by_its_value(name, value, verdict):
-    (found,) = environment.checks({name: value, "HOME": "/"})
+    (found,) = ros.variables({name: value, "HOME": "/"})
     assert found.verdict is verdict and f"{name}={value}" in found.found
     assert (found.advice == "") == (verdict is OK)
 
 
 def test_without_any_of_them_there_is_one_finding():
-    (found,) = environment.checks({"ROS_DOMAIN_ID": ""})
+    (found,) = ros.variables({"ROS_DOMAIN_ID": ""})
     assert found.verdict is OK and "RMW_IMPLEMENTATION" in found.found
 
 

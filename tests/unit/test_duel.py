@@ -11,7 +11,7 @@ from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import load_description
-from uam_lab.experiments.duel import report
+from uam_lab.experiments.duel import flights
 from uam_lab.experiments.duel.flights import DuelResult, judged, load_duel, standing, trials
 
 NAN = math.nan
@@ -33,7 +33,7 @@ def test_a_cell_is_the_mean_of_the_completed_flights_beside_the_published_figure
         loads={"a": 0.0},
         published={"law": {"a": (11.0, 9.0, 1.0)}, "other": {"a": (5.0, 6.0, 7.0)}},
     )
-    text = report.text(duel, flown)
+    text = flights.tables(duel, flown)
     assert "| law | 12.0 (11) |" in text and "| law | 24.0 (9) |" in text
     assert "| other | - (5) |" in text
     # worst joint, offset 2 mm, 20 ms survived as 40 was not, 1 of 4 flights ended early, lost
@@ -53,7 +53,7 @@ def test_a_pick_has_its_means_beside_the_published_figures_and_its_worst():
         scenarios=["a"],
         published={"law": {"a": (28.0, 26.0, 146.0, 24.0)}},
     )
-    text = report.text(duel, flown)
+    text = flights.tables(duel, flown)
     cells = "| law | 5.0 (28) | 10.0 (26) | 40 (146) | 7.0 (24) | 10.0 | 36 | 44 | 0.12 |"
     assert cells in text and "| law | 1.50 | - |  | 1 of 3 | 0 |" in text
 
@@ -62,7 +62,7 @@ def test_a_pick_has_its_means_beside_the_published_figures_and_its_worst():
 def test_a_delay_is_survived_up_to_the_first_that_is_not(ends, said):
     outcomes = {"c": "completed", "l": "lost"}
     flown = [result(delay=20.0 * (i + 1), outcome=outcomes[e]) for i, e in enumerate(ends)]
-    assert report.survived(flown, "law") == said
+    assert flights.survived(flown, "law") == said
 
 
 def test_standing_is_the_mean_error_in_the_second_half_of_the_longest_phase():

@@ -8,8 +8,8 @@ from adapting.flights import StudyFlight, mark
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
-from uam_lab.records.results import row_table
-from uam_lab.records.results.row_table import RowTableError
+from uam_lab.experiments.trials import experiment
+from uam_lab.experiments.trials.rows import RowTableError
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def test_rows_are_of_other_flights_after_an_edit_of_the_scenario(
         found.append(repr(of))
         raise RowTableError("nothing flies here")
 
-    monkeypatch.setattr(row_table, "RowTable", table)
+    monkeypatch.setattr(experiment, "RowTable", table)
     matrix = tmp_path / "matrix.yaml"
     matrix.write_text(
         "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, joint: 1}]}"

@@ -14,10 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.hand import hands, hinge_angles, reach, stretch
-from uam_control.arm.posture import working_posture
+from uam_control.arm.hand import hands, hinge_angles, reach, stretch, working_posture
 from uam_control.mission import Feasibility, load_scenario
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios import curves
 from uam_control.mission.scenarios.curves import Harmonic

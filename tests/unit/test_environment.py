@@ -12,7 +12,7 @@ import yaml
 from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
-from uam_lab.flights import arm_on_ground, clearance
+from uam_lab.flights import clearance
 from uam_sim_bridge.plant import Vehicle
 
 S500 = load_description()
@@ -164,12 +164,12 @@ def test_an_entry_is_refused_in_one_line(tmp_path, entry, said):
 )
 def test_entries_that_do_not_fit_together_are_refused_by_name(tmp_path, entries, said):
     with pytest.raises(ScenarioError) as error:
-        arm_on_ground.check(S500, scenario(tmp_path, entries))
+        clearance.check_standing(S500, scenario(tmp_path, entries))
     assert said in str(error.value)
 
 
 def test_what_touches_does_not_intersect():
-    arm_on_ground.check(S500, load_scenario(str(ROOM), S500))
+    clearance.check_standing(S500, load_scenario(str(ROOM), S500))
 
 
 BESIDE = {"kind": "box", "size": [0.2, 0.2, 2.0]}

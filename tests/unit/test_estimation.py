@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.repeats import Repeats
+from uam_control.estimation.pose_clock import Repeats
 from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler
 from uam_control.stages.estimator_stage import EstimatorStage
 

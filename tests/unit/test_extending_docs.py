@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from uam_control.setpoints.desired import Desired, level
+from uam_control.setpoints.targets import Desired, level
 from uam_control.stages.step import Stage
 from uam_sim_bridge.faults import imu_faults
 from uam_sim_bridge.faults.fault import Occurrence

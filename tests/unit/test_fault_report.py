@@ -19,7 +19,7 @@ from uam_lab.records.results import metrics
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import flight_page
+from uam_lab.report.page import pages
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError
 
 MATRIX = configuration.path("campaign/faults.yaml")
@@ -31,8 +31,8 @@ def record(begin, end, name="motor_loss", **values):
 
 def test_an_event_is_read_back_from_its_message_and_a_log():
     pytest.importorskip("rclpy")
-    from uam_lab.records.recording import fault_records as fault_log
-    from uam_msgs_py.messages.fault_events import FaultEvent
+    from uam_lab.records.recording.log_reader import fault_records
+    from uam_msgs_py.messages.flight_events import FaultEvent
 
     first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})
     other = FaultEvent("mavlink_cut", "MAVLink", 0, True, {"direction": "both"})
@@ -40,7 +40,7 @@ def test_an_event_is_read_back_from_its_message_and_a_log():
     reported = [(3_000_000_000, other), (2_000_000_000, first), (5_500_000_000, over)]
     for stamp, event in reported:
         assert FaultEvent.from_message(event.to_message(stamp)) == (stamp, event)
-    assert fault_log.records(reported, 1_000_000_000) == [
+    assert fault_records(reported, 1_000_000_000) == [
         record(1.0, 4.5, motor=2.0, remaining=0.7),
         record(2.0, None, "mavlink_cut", direction="both"),
     ]
@@ -64,7 +64,7 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
     assert [t.get_text() for t in figure.legends[0].texts][-1] == "fault"
     draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
-    html = flight_page.write_page(flight_folder).read_text()
+    html = pages.write_page(flight_folder).read_text()
     assert "Faults injected in this flight" in html and "<code>clock_jump</code>" in html
     assert fault_marks.handles(flight.info) == []
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from uam_control.mission import load_scenario
 from uam_sim_bridge.faults import read_schedule
-from uam_sim_bridge.faults.direct import DirectLink
+from uam_sim_bridge.faults.faulty_plant import DirectLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 

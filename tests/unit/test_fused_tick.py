@@ -13,10 +13,15 @@ from sensor_msgs.msg import JointState
 from uam_control.coordinates import coordinates
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_pose
+from uam_msgs_py.messages.convert import (
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    TrajectoryWriter,
+    read_pose,
+)
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import Template
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.tick_times import NoTickTimes

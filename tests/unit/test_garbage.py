@@ -5,7 +5,7 @@ import weakref
 
 import pytest
 
-from uam_msgs_py.node.garbage import GarbageCollection
+from uam_msgs_py.node.process_options import GarbageCollection
 
 
 class Knot:

@@ -11,8 +11,7 @@ import pytest
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
 from uam_control.grasp.evidence import Load, by_mass, by_pose, by_travel, identified_mass
-from uam_control.grasp.kinematics import hand_and_levers
-from uam_control.grasp.place_history import PlaceHistory
+from uam_control.grasp.kinematics import PlaceHistory, hand_and_levers
 from uam_control.grasp.sight import RunningMean
 from uam_control.grasp.thrust_reserve import expected_throttle
 from uam_control.mission import load_scenario

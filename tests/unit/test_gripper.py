@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from uam_control.arm.chain import Chain
 from uam_control.arm.hand import hands
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
-from uam_control.grasp.evidence import Evidence, fused
-from uam_control.grasp.grippers import GRIPPERS
+from uam_control.grasp.evidence import GRIPPERS, Evidence, fused
 from uam_control.grasp.windows import Approach
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.motion.trajectory import Move

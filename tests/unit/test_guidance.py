@@ -12,7 +12,7 @@ from uam_control.mission.guidance import Guidance
 from uam_control.mission.motion.path_clock import PathClock
 from uam_control.mission.motion.segments import Segment
 from uam_control.mission.motion.trajectory import empty_motion
-from uam_control.mission.shift import Shift
+from uam_control.mission.payload_watch import Shift
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 DT = 0.01

@@ -9,7 +9,7 @@ from uam_control.control.controllers import AttitudeController, PositionControll
 from uam_control.coordinates import CHI, CHI_DOT, PITCH, ROLL, YAW, Z
 from uam_control.mission import ChecklistReport, Mission, StartParameters, load_scenario
 from uam_control.mission.mission_output import HAND_CHECK, WAITING
-from uam_control.mission.permission import OLDEST
+from uam_control.mission.pre_arm import OLDEST
 from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.supervision import Authority, OperatorCommand, Readings, State

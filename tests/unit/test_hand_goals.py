@@ -17,7 +17,7 @@ from uam_control.arm.hand import hinge_angles, tools
 from uam_control.arm.placing import Room, placed, turning
 from uam_control.coordinates import ARM, CHI, CHI_DOT, YAW
 from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist, base_room, joint_room
-from uam_control.mission.motion.flyer import Flyer, flattened
+from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.mission.plan_limits import check
 from uam_control.mission.plans import GoalPose, PlanRefused
 from uam_control.profiles.profile import default_profile

@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped, Transform, TwistStamped
 from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.nodes.planner_inputs import read_hand_goal, read_hand_trajectory, read_hand_twist
 from uam_control.vehicle import load_description
 from uam_msgs_py.messages.layouts import BadMessage

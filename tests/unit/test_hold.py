@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.setpoints.desired import Desired, level
 from uam_control.setpoints.level_hold import UNKNOWN, HoldParameters, LevelHold
+from uam_control.setpoints.targets import Desired, level
 
 TILTED = np.array([0.1, -0.2, 1.0])
 LEVEL = np.zeros(3)

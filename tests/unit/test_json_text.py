@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.settings.json_text import DEEPEST, LONGEST, JsonError, read_json
-from uam_msgs_py.messages.fault_events import FaultEvent
+from uam_msgs_py.messages.flight_events import FaultEvent, ParameterChange
 from uam_msgs_py.messages.layouts import LONGEST_TEXT, BadMessage
-from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.serialized import MOST_BYTES, deserialized
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus, finite

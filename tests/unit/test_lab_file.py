@@ -22,8 +22,7 @@ from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.magnet.lines import LineParameters
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import LineParameters, SwitchingParameters
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 
 MISSING = object()

@@ -17,15 +17,15 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
-from uam_lab.records.recording import cdr, log_reader
+from uam_lab.records.recording import log_reader, logged_topics
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_lab.records.recording.logged_topics import ADAPTATION, Log
 from uam_lab.records.recording.mcap_reader import TopicLog, UnreadableLog
-from uam_lab.records.recording.message_definitions import schema
 from uam_lab.records.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
-from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.node.namespace import expanded
 
@@ -216,7 +216,7 @@ class ReferencesOnly:
         stamps = np.array([1, 2, 5, 6, 7], dtype=np.int64)[:n] * 1_000_000_000
         fields = {row: np.zeros((n, 8)) for row in log_reader.STATE_ROWS}
         fields["time_from_start"] = np.array([0, 0, 0, 1, 2], dtype=np.int64)[:n] * 1_000_000_000
-        return [cdr.Block(np.arange(n), stamps, [""] * 8, fields)]
+        return [logged_topics.Block(np.arange(n), stamps, [""] * 8, fields)]
 
 
 def test_checks_by_hand_before_the_flight_are_no_take_off():

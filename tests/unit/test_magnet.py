@@ -29,9 +29,11 @@ from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import CONTROLS, Server
 from uam_sim_bridge.devices.magnet import lines
-from uam_sim_bridge.devices.magnet.lines import FileLine, GpioLine, MagnetError
-from uam_sim_bridge.devices.magnet.magnet_driver import (
+from uam_sim_bridge.devices.magnet.lines import (
+    FileLine,
+    GpioLine,
     MagnetDriver,
+    MagnetError,
     MagnetSwitching,
     SwitchingParameters,
 )

@@ -7,7 +7,7 @@ import pytest
 from uam_control.offboard import autopilot_magnet
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.modes import MavCmd
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import SwitchingParameters
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/hardware.md").read_text()
 

@@ -13,9 +13,16 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
 from uam_lab.cli.margins import verdict
-from uam_lab.experiments.margins.linear import IN, LinearBlock, delay, join, linearise
+from uam_lab.experiments.margins.linear import (
+    IN,
+    LinearBlock,
+    common_delay,
+    delay,
+    join,
+    linearise,
+    margins,
+)
 from uam_lab.experiments.margins.loops import analyse, step_response
-from uam_lab.experiments.margins.margins import common_delay, margins
 from uam_lab.experiments.margins.plant_model import plant_model, rotor_model, zero_order_hold
 from uam_lab.experiments.margins.pose_delay import pose_delay, remaining
 from uam_lab.experiments.margins.stack_model import stack_model

@@ -4,6 +4,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_lab.records.recording.mcap_reader import (
     HEADER,
@@ -12,7 +13,6 @@ from uam_lab.records.recording.mcap_reader import (
     read_log,
     read_metadata,
 )
-from uam_lab.records.recording.message_definitions import schema
 
 rclpy_serialization = pytest.importorskip("rclpy.serialization")
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"

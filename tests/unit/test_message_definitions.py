@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_lab.records.recording.message_definitions import DefinitionMissing, dependencies, schema
+from uam_lab.records.recording.bag import DefinitionMissing, dependencies, schema
 
 pytest.importorskip("rclpy")
 

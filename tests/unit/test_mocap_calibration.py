@@ -17,9 +17,9 @@ from uam_control.maths.rotations import (
 )
 from uam_lab.cli.main import main
 from uam_sim_bridge.devices.mocap import calibration as calibrations
-from uam_sim_bridge.devices.mocap import live, raw_log
+from uam_sim_bridge.devices.mocap import measurement
+from uam_sim_bridge.devices.mocap.calibration import fit
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, TrackedBody
-from uam_sim_bridge.devices.mocap.fit import fit
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.devices.mocap.measurement import angle_between, places, still
 from uam_sim_bridge.plant import Vehicle
@@ -152,8 +152,8 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
     body = TrackedBody("uam")
     poses = recorded(body, standing((1, 2), 0.3), 20, 1.7e9, NOISE, seed=seed)
     file = tmp_path_factory.getbasetemp() / "raw.csv"
-    raw_log.write(file, poses)
-    for (stamp, one), (read_stamp, read) in zip(poses, raw_log.read(file), strict=True):
+    measurement.write_poses(file, poses)
+    for (stamp, one), (read_stamp, read) in zip(poses, measurement.read_poses(file), strict=True):
         assert read_stamp == pytest.approx(stamp, abs=1e-6)
         np.testing.assert_allclose(read.position, one.position, atol=1e-8)
         np.testing.assert_allclose(read.quaternion, one.quaternion, atol=1e-8)
@@ -184,12 +184,12 @@ def test_a_recording_that_is_none_is_refused(tmp_path, content, reason):
     file = tmp_path / "raw.csv"
     file.write_bytes(content.encode("latin-1"))
     with pytest.raises(MocapError, match=reason):
-        raw_log.read(file)
+        measurement.read_poses(file)
 
 
 def test_the_command_calibrates_from_a_recording(tmp_path, capsys):
     log, out = tmp_path / "raw.csv", tmp_path / "lab.yaml"
-    raw_log.write(log, recording())
+    measurement.write_poses(log, recording())
     given = ["--log", str(log), "--out", str(out), "--pivot", "0.02", "0"]
     assert main(["calibrate-mocap", *given]) == 0
     assert "moved 1.00 m" in capsys.readouterr().out
@@ -200,7 +200,7 @@ def test_the_command_calibrates_from_a_recording(tmp_path, capsys):
 
 def test_the_command_refuses_in_one_line(tmp_path, capsys):
     log, out = tmp_path / "raw.csv", tmp_path / "lab.yaml"
-    raw_log.write(log, recorded(TrackedBody("uam"), standing((0, 0), 0.0)))
+    measurement.write_poses(log, recorded(TrackedBody("uam"), standing((0, 0), 0.0)))
     assert main(["calibrate-mocap", "--log", str(log), "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert "1 places where the vehicle stands still, 2 are needed" in said
@@ -229,7 +229,7 @@ def test_the_command_guides_and_measures_over_real_sockets(tmp_path, capsys, mon
         # frames the wall's clock ends it.
         end = time.monotonic() + 60.0
         clock = SimpleNamespace(monotonic=lambda: max(server.sent / RATE, time.monotonic() - end))
-        monkeypatch.setattr(live, "time", clock)
+        monkeypatch.setattr(measurement, "time", clock)
         given = ["--port", str(server.port), "--out", str(out), "--save", str(raw)]
         assert main(["calibrate-mocap", *given, "--duration", "1"]) == 0, capsys.readouterr().err
         assert main(["calibrate-mocap", *given, "--body", "drone"]) == 2
@@ -239,7 +239,7 @@ def test_the_command_guides_and_measures_over_real_sockets(tmp_path, capsys, mon
     found = calibrations.load(str(out))
     np.testing.assert_allclose(found.pivot, (0, 0, 0.1), atol=1e-5)
     assert found.measured["distance_m"] == pytest.approx(0.8, abs=1e-4)
-    assert len(raw_log.read(raw)) > RATE / 2
+    assert len(measurement.read_poses(raw)) > RATE / 2
 
 
 def test_the_standing_height_is_that_of_the_landing_gear():

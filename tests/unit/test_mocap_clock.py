@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_sim_bridge.devices.mocap.clock_offset import DRIFT_MAX, ClockOffset
-from uam_sim_bridge.devices.mocap.driver import RESTART, FrameCount
+from uam_sim_bridge.devices.mocap.driver import DRIFT_MAX, RESTART, ClockOffset, FrameCount
 
 RATE = 120.0
 

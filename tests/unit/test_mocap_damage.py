@@ -13,7 +13,7 @@ from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, TrackedBody
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
-from uam_sim_bridge.devices.mocap.natnet_reader import UNREADABLE, read_frame, read_models
+from uam_sim_bridge.devices.mocap.natnet_messages import UNREADABLE, read_frame, read_models
 from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource
 
 PATIENCE = 60.0  # [s]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from uam_sim_bridge.devices.mocap import fit, measurement
+from uam_sim_bridge.devices.mocap import calibration, measurement
 from uam_sim_bridge.devices.mocap.calibration import ENTRIES
 from uam_sim_bridge.devices.mocap.library_source import SYSTEMS
 
@@ -24,11 +24,11 @@ def test_the_page_names_every_system_and_the_limits_of_the_code():
     assert all(f"`{system}`" in PAGE for system in SYSTEMS if system != "mock")
     limits = (
         f"{1e3 * measurement.MOVED:g} mm, {math.degrees(measurement.TURNED):g}°",
-        f"at least {fit.SHORTEST:g} m",
-        f"{1e2 * fit.STEEPEST:g} cm: a floor",
-        f"{math.degrees(fit.TILT):g}°, {math.degrees(fit.TURN):g}°",
-        f"level | {math.degrees(fit.DEFINED_TILT):g}° |",
-        f"−{-fit.LOWEST:g} to {fit.HIGHEST:g} m",
+        f"at least {calibration.SHORTEST:g} m",
+        f"{1e2 * calibration.STEEPEST:g} cm: a floor",
+        f"{math.degrees(calibration.TILT):g}°, {math.degrees(calibration.TURN):g}°",
+        f"level | {math.degrees(calibration.DEFINED_TILT):g}° |",
+        f"−{-calibration.LOWEST:g} to {calibration.HIGHEST:g} m",
     )
     for limit in limits:
         assert limit in PAGE, limit

@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from uam_lab.records.recording.topic_recorder import own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import OK, diagnostic
-from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message
+from uam_msgs_py.messages.tf_message import Transform, read_transforms, transforms_message
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 

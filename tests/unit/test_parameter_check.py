@@ -15,8 +15,8 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import (
     expected,
     stream_loss,
     unanswered,
+    value_of,
 )
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import value_of
 
 
 def decoded(value, kind, layout=None):

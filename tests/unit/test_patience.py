@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from uam_sim_bridge import patience
-from uam_sim_bridge.patience import Patience
+from uam_sim_bridge import paced_clock
+from uam_sim_bridge.paced_clock import Patience
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that the test sets: clock[0] [s]."""
     now = [100.0]
-    monkeypatch.setattr(patience.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(paced_clock.time, "monotonic", lambda: now[0])
     return now
 
 

@@ -10,7 +10,7 @@ import pytest
 from uam_control.settings.process_parameters import ProcessParameters
 from uam_lab.flights.flight_options import BUILTIN
 from uam_lab.flights.flight_settings import AUTOPILOT
-from uam_lab.flights.ros.placement import NICE, pair, placing
+from uam_lab.flights.ros.engine import NICE, pair, placing
 from uam_msgs_py.node import wiring
 
 

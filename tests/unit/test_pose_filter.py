@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.estimation.history import value_at
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     PoseFilter,
@@ -15,6 +14,7 @@ from uam_control.estimation.pose_filter import (
     predict,
     shift,
 )
+from uam_control.estimation.waiting import value_at
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HALF = math.sqrt(0.5)

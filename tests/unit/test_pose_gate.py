@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from uam_control.ages import REJECTED
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.pose_gate import PoseGate
+from uam_control.estimation.pose_clock import PoseGate
 
 PERIOD, TICK = 0.008, 0.004
 LEVEL, WEIGHT = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81])

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from uam_control.ages import age_by
-from uam_control.setpoints.desired import Desired, level
 from uam_control.setpoints.setpoint_types import position_setpoint
-from uam_control.setpoints.targets import FLOWN_MASKS, PositionTarget
+from uam_control.setpoints.targets import FLOWN_MASKS, Desired, PositionTarget, level
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.loops.position_control import (
+from uam_sim_bridge.autopilot.loops.position_modes import (
     PositionControl,
     attitude_of,
     limit_across,

@@ -17,12 +17,12 @@ from uam_lab.experiments.faults.matrix import Cell, Promise
 from uam_lab.experiments.faults.rehearsed import judged, with_checklist
 from uam_lab.experiments.trials.outcome import LOST, REFUSED
 from uam_lab.flights.processes.interrupts import INTERRUPTED
-from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
 from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
-from uam_lab.records.recording.node_statistics import latencies
+from uam_lab.records.recording.logged_topics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.faults import Schedule
@@ -66,8 +66,8 @@ def test_only_the_names_of_devices_are_replaced(tmp_path):
             cockpit={"address": "0.0.0.0"},
         )
     )
-    document = emulated_lab.emulated(lab, tmp_path / "devices", 40000)
-    rehearsed = emulated_lab.write(document, lab.file, tmp_path)
+    document = laboratory_process.emulated_lab(lab, tmp_path / "devices", 40000)
+    rehearsed = laboratory_process.write_lab(document, lab.file, tmp_path)
     before, after = flat(yaml.safe_load(lab.file.read_text())), flat(document)
     changed = {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
     # files are written in full, since the new file lies elsewhere
@@ -91,7 +91,9 @@ def test_files_beside_the_lab_file_are_found_from_the_result_folder(tmp_path):
     arm = yaml.safe_load(template())["arm"]
     (folder / "my_arm.yaml").write_text(yaml.safe_dump({"arm": arm | {"baud_rate": 2000000}}))
     lab = load_lab(given(folder, arm="my_arm.yaml", mocap={"calibration": "my_mocap.yaml"}))
-    rehearsed = emulated_lab.write(emulated_lab.emulated(lab, out, 40000), lab.file, out)
+    rehearsed = laboratory_process.write_lab(
+        laboratory_process.emulated_lab(lab, out, 40000), lab.file, out
+    )
     assert rehearsed.arm.baud_rate == 2000000
     assert Path(rehearsed.mocap.calibration).read_text() == nominal
 
@@ -99,7 +101,7 @@ def test_files_beside_the_lab_file_are_found_from_the_result_folder(tmp_path):
 def test_another_kind_of_motion_capture_cannot_be_rehearsed(tmp_path):
     lab = load_lab(given(tmp_path, mocap={"source": "motioncapture"}))
     with pytest.raises(LabError, match="source: motioncapture: only natnet can be rehearsed"):
-        emulated_lab.emulated(lab, tmp_path, 40000)
+        laboratory_process.emulated_lab(lab, tmp_path, 40000)
 
 
 PORTS = Ports(3, 4, 4563, 14543, 14583)

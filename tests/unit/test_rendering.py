@@ -12,8 +12,8 @@ from uam_lab.records.results.timeseries import Series
 from uam_lab.report import build
 from uam_lab.report.build import build_report
 from uam_lab.report.figures import figures
-from uam_lab.report.figures.poses import Poses
-from uam_lab.report.video import flight_video, video
+from uam_lab.report.figures.path_figure import Poses
+from uam_lab.report.video import flight_pictures, flight_video
 
 
 def cut(series, end):
@@ -57,13 +57,13 @@ def test_snapshots_are_those_of_the_scenario_up_to_the_end_of_the_flight(flight)
 
 
 def test_a_video_has_a_limited_length_and_an_integer_speed_factor(flight):
-    rows, speed = video.frame_rows(flight)
+    rows, speed = flight_pictures.frame_rows(flight)
     assert speed == 6
-    assert 12.0 < len(rows) / video.RATE <= video.LONGEST_S
+    assert 12.0 < len(rows) / flight_pictures.RATE <= flight_pictures.LONGEST_S
     steps = np.diff(flight.time[rows])
-    assert steps.mean() == pytest.approx(speed / video.RATE, rel=0.01)
-    assert video.speed_up(14.0) == 1
-    assert video.speed_up(15.1) == 2
+    assert steps.mean() == pytest.approx(speed / flight_pictures.RATE, rel=0.01)
+    assert flight_pictures.speed_up(14.0) == 1
+    assert flight_pictures.speed_up(15.1) == 2
 
 
 def test_without_a_renderer_the_report_is_written_with_advice(flight_folder, monkeypatch):
@@ -118,7 +118,7 @@ def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
     assert "yuv420p" in probe.stderr
     assert "848x480" in probe.stderr
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(rendered.video))
-    assert frames == len(video.frame_rows(short)[0])
+    assert frames == len(flight_pictures.frame_rows(short)[0])
 
 
 def test_an_error_of_the_figures_ends_the_rendering(flight_folder, monkeypatch):

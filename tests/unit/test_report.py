@@ -14,7 +14,7 @@ from uam_lab.report.build import build_report
 from uam_lab.report.facts import flight_summary
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import figures
-from uam_lab.report.page import console, flight_page
+from uam_lab.report.page import console, pages
 from uam_lab.report.video import flight_video
 
 
@@ -53,7 +53,7 @@ def test_the_report_is_one_page_without_external_files(flight_folder, monkeypatc
 def test_the_page_shows_the_stability_analysis(flight_folder, monkeypatch):
     for name in list(figures.FIGURES):
         monkeypatch.delitem(figures.FIGURES, name)
-    assert "Appendix" not in text_of(flight_page.write_page(flight_folder).read_text())
+    assert "Appendix" not in text_of(pages.write_page(flight_folder).read_text())
     build_report(flight_folder, pictures=False)
     found = json.loads((flight_folder / "stability.json").read_text())
     words = text_of((flight_folder / "report.html").read_text())
@@ -64,7 +64,7 @@ def test_the_page_shows_the_stability_analysis(flight_folder, monkeypatch):
 
 
 def test_the_page_shows_the_result_and_the_command(flight_folder):
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     assert metrics["mission_completed"] is True
     assert "Mission completed" in words
@@ -81,7 +81,7 @@ def test_the_page_shows_the_result_and_the_command(flight_folder):
 def test_the_page_shows_the_identified_thrust(flight_folder):
     found = {"end": 0.859, "least": 0.8586, "largest": 1.0}
     change_metrics(flight_folder, thrust_factor=found)
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "0.859 of the assumed thrust at the end (0.859 to 1.000 in flight)" in words
 
 
@@ -97,7 +97,7 @@ def test_the_page_marks_errors_above_the_papers_and_shows_the_abort_reason(fligh
         latency_ms={"p50": 2.5, "p99": 10.25, "max": None},
         missed_ticks=7,
     )
-    html = flight_page.write_page(flight_folder).read_text()
+    html = pages.write_page(flight_folder).read_text()
     words = text_of(html)
     assert "aborted: tilt &lt;70&gt;" in html
     assert (words.count("better"), words.count("equal"), words.count("worse")) == (5, 1, 1)
@@ -116,7 +116,7 @@ def test_an_incomplete_flight_and_another_mission_are_not_compared(
     flight_folder, changes, headline
 ):
     change_metrics(flight_folder, **changes)
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     out = io.StringIO()
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     Terminal(file=out, width=100).print(console.summary(metrics))
@@ -131,7 +131,7 @@ def test_the_video_has_a_picture_before_it_plays(flight_folder, tmp_path):
     picture.write_bytes(b"picture")
     video.write_bytes(b"video")
     rendered = flight_video.Rendered((picture,), picture, video)
-    html = flight_page.write_page(flight_folder, rendered).read_text()
+    html = pages.write_page(flight_folder, rendered).read_text()
     assert html.count('poster="data:image/png;base64,cGljdHVyZQ=="') == 1
 
 
@@ -142,7 +142,7 @@ def test_page_and_console_show_the_supervisors_interventions(flight_folder):
     ]
     assert flight_summary.supervision_story({"transitions": steps[:1]}) is None
     change_metrics(flight_folder, transitions=steps)
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "3.250 s flying → holding tilt 0.90 rad" in words
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     assert flight_summary.supervision_story(metrics) == "holding at 3.2 s (tilt 0.90 rad)"
@@ -161,7 +161,7 @@ def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
     assert rows["lambda_1"].differs
     assert not rows["epsilon"].differs
     assert found.safeguards == {"position_controller": ["k_ceiling = 5 (each)"]}
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "position_controller: k_ceiling = 5 (each)" in words
     assert "No safeguard was on" not in words
 
@@ -185,7 +185,7 @@ def test_a_reconstructed_law_is_labelled_and_not_compared_with_table_one(flight_
     (flight_folder / "parameters.yaml").write_text(file.read_text())
     clamps = {"position": 0, "attitude": 3, "arm": 12}
     change_metrics(flight_folder, controller="asmc2", clamps=clamps)
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "controller ASMC-2 (reconstructed)" in words
     assert "controller asmc2" not in words and "flew as printed" not in words
     assert "position 0, attitude 3, arm 12" in words
@@ -198,7 +198,7 @@ def test_a_reconstructed_law_is_labelled_and_not_compared_with_table_one(flight_
 def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
     for name in ("parameters.yaml", "versions.json", "info.json"):
         (flight_folder / name).unlink()
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "parameters.yaml" in words
     with pytest.raises(timeseries.UnreadableFlight):
         build_report(flight_folder.parent / "nothing")
@@ -206,7 +206,7 @@ def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
 
 def test_the_page_reports_a_missing_renderer(flight_folder):
     rendered = flight_video.Rendered(problem=flight_video.HOW_TO_GET_ONE)
-    words = text_of(flight_page.write_page(flight_folder, rendered).read_text())
+    words = text_of(pages.write_page(flight_folder, rendered).read_text())
     assert "apt install libegl1 libgl1-mesa-dri" in words
 
 
@@ -240,7 +240,7 @@ def test_notes_and_changes_of_the_vehicle_are_on_the_page(flight_folder):
     info = json.loads((flight_folder / "info.json").read_text())
     info |= {"notes": ["2 messages lost"], "vehicle_changes": {"air.wind": [2.0, 0.0, 0.0]}}
     (flight_folder / "info.json").write_text(json.dumps(info))
-    words = text_of(flight_page.write_page(flight_folder).read_text())
+    words = text_of(pages.write_page(flight_folder).read_text())
     assert "Note: 2 messages lost" in words
     assert "air.wind 2.0, 0.0, 0.0" in words
 

@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from uam_lab.report.facts import change_rows
+from uam_lab.report.facts import parameter_table
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import flight_page
+from uam_lab.report.page import pages
 
 
 def entry(time, accepted=True, **values):
@@ -25,7 +25,7 @@ def entry(time, accepted=True, **values):
 
 def test_a_change_is_read_back_from_its_message():
     pytest.importorskip("rclpy")
-    from uam_msgs_py.messages.parameter_changes import ParameterChange
+    from uam_msgs_py.messages.flight_events import ParameterChange
 
     values = {"varpi": (0.1, math.inf), "law": ("a -> b", None), "nu": ([1.0, 2.0], [1.0])}
     change = ParameterChange("arm_controller", "parameter service", values, "varpi: no")
@@ -37,9 +37,9 @@ def test_a_change_is_read_back_from_its_message():
 
 def test_numbers_that_would_overlap_share_one_label():
     info = {"parameter_changes": [entry(t, varpi=[0.1, 0.2]) for t in (1.0, 1.1, 1.2, 9.0)]}
-    assert change_rows.labels(change_rows.rows(info), 1.0) == [(1.0, "1–3"), (9.0, "4")]
+    assert parameter_table.labels(parameter_table.rows(info), 1.0) == [(1.0, "1–3"), (9.0, "4")]
     many = {"parameter_changes": [entry(float(t)) for t in range(100)]}
-    assert change_rows.labels(change_rows.rows(many), 0.5) == []
+    assert parameter_table.labels(parameter_table.rows(many), 0.5) == []
 
 
 def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
@@ -56,6 +56,6 @@ def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
     ]
     draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
-    html = flight_page.write_page(flight_folder).read_text()
+    html = pages.write_page(flight_folder).read_text()
     assert "Parameters changed in flight" in html and "varpi: &lt;no&gt;" in html
     assert "2 requests were accepted" in html

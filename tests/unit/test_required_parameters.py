@@ -18,8 +18,13 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, AutopilotState
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
-from uam_sim_bridge.mavlink.telemetry.parameter_check import WRITES
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, BATCH, setting, value_of
+from uam_sim_bridge.mavlink.telemetry.parameter_check import (
+    ATTEMPTS,
+    BATCH,
+    WRITES,
+    setting,
+    value_of,
+)
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters, Rule
 from uam_sim_bridge.nodes.autopilot_topics import comparison
 

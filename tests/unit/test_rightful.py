@@ -10,8 +10,8 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.door import Refusals
+from uam_msgs_py.node.health import LASTING, StampWatch
 from uam_msgs_py.node.rightful import PUBLISHERS, Rightful, RightfulNodes
-from uam_msgs_py.node.stamp_watch import LASTING, StampWatch
 
 PERIOD = 4_000_000
 

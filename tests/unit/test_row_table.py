@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from uam_control.coordinates import coordinates
 from uam_lab.experiments.faults.trial import ROWS, FaultResult
+from uam_lab.experiments.trials.rows import RowTable, RowTableError
 from uam_lab.experiments.trials.trial import TrialResult, result_rows
-from uam_lab.records.results.row_table import RowTable, RowTableError
 
 SCHEMA = pa.schema([("flight", pa.int64()), ("error", pa.float64()), ("why", pa.string())])
 
@@ -68,7 +68,7 @@ def test_rows_that_two_parts_have_are_merged(tmp_path):
 
 
 def test_many_parts_are_merged_in_between(tmp_path, monkeypatch):
-    monkeypatch.setattr("uam_lab.records.results.row_table.PARTS", 3)
+    monkeypatch.setattr("uam_lab.experiments.trials.rows.PARTS", 3)
     rows = table(tmp_path)
     for number in range(7):
         rows.add(row(number))

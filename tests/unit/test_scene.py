@@ -19,11 +19,11 @@ from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_
 from uam_control.mission import load_scenario
 from uam_lab.cockpit.scene_markers import PATH_POINTS, PATH_STEP, FlownPath, Markers, ReferencePath
 from uam_lab.experiments.budget.shuttle import CYCLE, shuttle
+from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
-from uam_lab.records.recording.message_definitions import schema
 from uam_msgs_py.messages import tf_message
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.transforms import Transform, transforms_message
+from uam_msgs_py.messages.tf_message import Transform, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import box, frames, hanging
 from uam_sim_bridge.plant.gripper import FINGERS

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from uam_control.setpoints.desired import Desired, level
 from uam_control.setpoints.setpoint_types import attitude_setpoint, rates_setpoint, wrench_setpoint
+from uam_control.setpoints.targets import Desired, level
 
 HALF = math.sqrt(0.5)
 # turned left by a quarter turn: nose to the north

@@ -12,8 +12,7 @@ from uam_control.mission import Mission, load_scenario
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
-from uam_control.setpoints.targets import AttitudeTarget
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage

@@ -1,6 +1,6 @@
 """A vehicle that somebody else lands stands when it has sunk, and sinks no more."""
 
-from uam_control.mission.standing import Standing
+from uam_control.mission.ground import Standing
 
 
 def test_it_stands_once_it_has_sunk_and_stopped():

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.stages.ahead import serves
-from uam_control.stages.tick_stamps import LONG, TickStamps
+from uam_control.stages.tick_stamps import LONG, TickStamps, serves
 from uam_msgs_py.node.joins import Ahead, StampJoin
 
 PERIOD = 4_000_000

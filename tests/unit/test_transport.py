@@ -9,7 +9,7 @@ import pytest
 from set_clock import SetClock
 
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
-from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
+from uam_sim_bridge.mavlink.transport.stream_transport import TcpTransport
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport, open_transport
 from uam_sim_bridge.ports import PortError
 

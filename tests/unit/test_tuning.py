@@ -16,7 +16,7 @@ from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.main import main
 from uam_lab.experiments.trials.trial import TrialResult
-from uam_lab.experiments.tuning import convergence, front, search_results
+from uam_lab.experiments.tuning import front, search_results
 from uam_lab.experiments.tuning.search import Task, evaluated_start, open_study
 from uam_lab.experiments.tuning.space import Cost, TuningError, load_space
 
@@ -238,14 +238,14 @@ def test_wrong_use_is_one_line(tmp_path, capsys, monkeypatch, arguments, complai
 
 def test_convergence_by_hand():
     curve = [4.0, 3.0, 2.0, 1.99, 1.985]
-    assert convergence.improvement(curve, 2) == pytest.approx(0.0075)  # from 2.0 to 1.985
-    assert convergence.improvement(curve, 4) == pytest.approx(2.015 / 4.0)
-    assert convergence.improvement(curve, 5) == math.inf
-    assert convergence.in_words(curve, 2).startswith("converged: the last 2 of 5 evaluations")
-    assert convergence.in_words(curve, 4).startswith("not converged: the last 4")
-    assert convergence.in_words(curve, 9).startswith("not converged: 5 evaluations")
-    assert convergence.in_words(curve[:2], convergence.LEAST).startswith("not converged: 2 eval")
-    assert convergence.in_words(curve[:1], 0).startswith("not converged")
+    assert front.improvement(curve, 2) == pytest.approx(0.0075)  # from 2.0 to 1.985
+    assert front.improvement(curve, 4) == pytest.approx(2.015 / 4.0)
+    assert front.improvement(curve, 5) == math.inf
+    assert front.convergence(curve, 2).startswith("converged: the last 2 of 5 evaluations")
+    assert front.convergence(curve, 4).startswith("not converged: the last 4")
+    assert front.convergence(curve, 9).startswith("not converged: 5 evaluations")
+    assert front.convergence(curve[:2], front.LEAST).startswith("not converged: 2 eval")
+    assert front.convergence(curve[:1], 0).startswith("not converged")
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from uam_sim_bridge import patience
+from uam_sim_bridge import paced_clock
 from uam_sim_bridge.mavlink.hil.sitl_ports import SILENT, UdpPort
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 
@@ -14,7 +14,7 @@ HEARTBEAT = mavlink2.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3)
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(patience.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(paced_clock.time, "monotonic", lambda: now[0])
     return now
 
 

@@ -20,7 +20,7 @@ from uam_lab.flights.vehicle import vehicle_engine, vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Magnet
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
-from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
+from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.terminal import Terminal
 from uam_msgs_py.messages import topics
@@ -230,13 +230,13 @@ def test_in_the_air_the_first_stop_lands_and_the_second_one_ends(state):
 
 
 def test_the_flight_ends_some_time_after_the_mission(monkeypatch):
-    from uam_lab.flights.vehicle import vehicle_course
+    from uam_lab.flights.vehicle import vehicle_engine
 
     now = [100.0]
-    monkeypatch.setattr(vehicle_course.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(vehicle_engine.time, "monotonic", lambda: now[0])
     made = course(status("disarmed", done=True), StopRequest())
     assert made.goes_on()
-    now[0] += vehicle_course.LINGER - 0.1
+    now[0] += vehicle_engine.LINGER - 0.1
     assert made.goes_on()
     now[0] += 0.2
     assert not made.goes_on()

@@ -8,8 +8,8 @@ import pytest
 from random_chains import chi_of, in_pinocchio, pin, random_chain
 
 from uam_control.arm.chain import as_parameters
-from uam_control.arm.dynamics import gravity_torque
 from uam_control.arm.floating import decoupled, stiff, write_task
+from uam_control.arm.kinematics import gravity_torque
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.thrust_direction import write_thrust_attitude
 from uam_control.control.whole_body import WholeBody

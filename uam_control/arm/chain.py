@@ -11,7 +11,7 @@ How others use it:
     position, rotation = hand_pose(chain, q, DOWN)
     hand_jacobian(chain, q, DOWN, jacobian)                    # (6, n): linear, then angular
     centre = vehicle_centre(chain, q, DOWN)
-    # dynamics.py
+    # dynamics in kinematics.py
     push, moment = inverse_dynamics(chain, motion, force, rates, turning, torques)
     push, moment = gravity_torque(chain, q, force, torques)
     mass_matrix(chain, q, matrix)

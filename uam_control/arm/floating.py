@@ -14,9 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.dynamics import ACCELERATION, ANGLE, vehicle_dynamics
 from uam_control.arm.hand import heading
-from uam_control.arm.kinematics import DOWN, ORIGIN, hand_jacobian, hand_pose, vehicle_centre
+from uam_control.arm.kinematics import (
+    ACCELERATION,
+    ANGLE,
+    DOWN,
+    ORIGIN,
+    hand_jacobian,
+    hand_pose,
+    vehicle_centre,
+    vehicle_dynamics,
+)
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import DOWN, hand_jacobian, hand_pose, hanging, last_link
@@ -40,6 +41,10 @@ UP = 1e-3  # [rad] of the hinge of an arm that points up, from half a turn
 UPRIGHT = 0.9  # of the z component of a joint's axis, from which on it is a yaw joint
 # relative to the slopes' squared size; absolute, for slopes of zero
 DAMPING, LEAST = 1e-9, 1e-30
+STARTS = 24  # of the search, a fixed set
+INSIDE = 1e-9  # of a range, in which a search begins
+SEARCH_STEP = math.radians(5.0)  # of the search
+GAIN = 1e-3  # relative, by which another posture must be better; less does not count
 
 
 @jit
@@ -185,3 +190,81 @@ def reach(chain: Chain, first: int = 0) -> float:
     """Return the length [m] of the stretched arm, from joint `first` to the end effector."""
     parts = (*chain.offsets[first + 1 :], chain.hand_place, chain.swing_reach)
     return float(sum(np.linalg.norm(part) for part in parts))
+
+
+def angles_for(
+    chain: Chain, position: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the angles (n,) [rad] within low, high (n,) that bring the hand nearest, and how near.
+
+    position (3,) [m]: in the frame of a level base; the distance [m] is 0 where the arm reaches it.
+    """
+
+    def miss(angles: np.ndarray) -> np.ndarray:
+        return np.array(hand_pose(chain, angles, DOWN)[0]) - position
+
+    def slopes(angles: np.ndarray) -> np.ndarray:
+        jacobian = np.empty((6, len(angles)))
+        hand_jacobian(chain, angles, DOWN, jacobian)
+        return jacobian[:3]
+
+    best, least = 0.5 * (low + high), np.inf
+    shares = np.random.default_rng(0).uniform(INSIDE, 1.0 - INSIDE, (STARTS, len(low)))
+    for start in low + shares * (high - low):
+        found = least_squares(miss, start, slopes, (low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        distance = float(np.linalg.norm(found.fun))
+        if distance < least - 1e-9:
+            best, least = found.x, distance
+    return best, least
+
+
+def reached(chain: Chain, low: np.ndarray, high: np.ndarray, count: int) -> np.ndarray:
+    """Return places (count, 3) [m] of the hand of a level base, angles uniform within low, high."""
+    postures = np.random.default_rng(0).uniform(low, high, (count, len(low)))
+    return np.array([hand_pose(chain, one, DOWN)[0] for one in postures])
+
+
+def working_posture(
+    chain: Chain,
+    stowed: Sequence[float],
+    low: np.ndarray,
+    high: np.ndarray,
+    hinge: tuple[float, float] = (-math.inf, math.inf),
+) -> np.ndarray:
+    """Return the angles (n,) [rad] within low, high (n,) in which the hand moves best.
+
+    hinge: range [rad] of the hinge that the hand hangs on.
+
+    That is the largest product of the singular values of its Jacobian (Yoshikawa's
+    manipulability), found joint by joint from `stowed` on.
+    """
+    angles = np.clip(np.asarray(stowed, dtype=float), low, high)
+    counted = freedom(chain)
+    best = _manipulability(chain, angles, counted, hinge)
+    improved = True
+    while improved:
+        improved = False
+        for joint in range(len(angles)):
+            steps = np.arange(
+                math.ceil((low[joint] - angles[joint]) / SEARCH_STEP),
+                math.floor((high[joint] - angles[joint]) / SEARCH_STEP) + 1,
+            )
+            tried = np.repeat(angles[None], len(steps), axis=0)
+            tried[:, joint] += SEARCH_STEP * steps
+            found = [_manipulability(chain, one, counted, hinge) for one in tried]
+            if found and max(found) > best + GAIN * abs(best):
+                good = np.flatnonzero(np.array(found) > max(found) - GAIN * abs(max(found)))
+                nearest = good[np.argmin(np.abs(steps[good]))]
+                best, angles = found[nearest], tried[nearest]
+                improved = True
+    return angles
+
+
+def _manipulability(
+    chain: Chain, angles: np.ndarray, counted: int, hinge: tuple[float, float]
+) -> float:
+    """Return the product of the singular values, below 0 where the hinge is beyond its range."""
+    stands = float(hinge_angles(chain, angles[None])[0])
+    if stands < hinge[0] or stands > hinge[1]:
+        return -max(hinge[0] - stands, stands - hinge[1])
+    return float(np.prod(stretch(chain, angles)[:counted]))

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain, ChainParameters
-from uam_control.arm.dynamics import LINK, newton_euler
-from uam_control.arm.kinematics import DOWN, ORIGIN, vehicle_centre
+from uam_control.arm.kinematics import DOWN, LINK, ORIGIN, newton_euler, vehicle_centre
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import put

@@ -1,6 +1,14 @@
 """What a controller computes around its law at a tick: one compiled call before it, one after it.
 
-The steps themselves are in `tracking_errors`, `output_limits`, `arm_load`, `thrust_direction`.
+The steps themselves are in `tracking_errors`, `output_limits`, `arm_load`, `thrust_direction`, but
+for a lead for rotors that lag: with it the thrust follows the position law's force faster than they
+do. The thrust f follows its command c as lag f' = c - f. With
+
+    c = f + lag / response (u - f)
+
+it follows the force u as response f' = u - f. f is modelled from the commands as they were limited,
+so that a limit leaves no error behind. All of the force is scaled, so that its direction stays, and
+with it the desired attitude.
 """
 
 from __future__ import annotations
@@ -21,10 +29,9 @@ from uam_control.control.output_limits import (
     take_known_load,
     turn_level,
 )
-from uam_control.control.rotor_lead import RotorLead, lead_force
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
-from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law import LawArrays, LawInputs
 from uam_control.maths.compiled import borrowing, inlined
@@ -32,6 +39,35 @@ from uam_control.maths.compiled import borrowing, inlined
 # saturated: whether a limit changed the output of the last tick; flying: whether the law has begun;
 # printed: form of the errors' rates; frozen: see `Law`; time [s]: counted for the goals of servos
 WHOLE, REAL = "saturated flying printed frozen", "time"
+
+
+class RotorLead(NamedTuple):
+    """lag, response [s]: see above; no lead for a response of 0. made (1,) [N]: upward part of f,
+    NaN at first: then it is u."""
+
+    lag: float
+    response: float
+    made: np.ndarray
+
+
+@borrowing
+def lead_force(lead: RotorLead, least: float, largest: float, dt: float, tau: np.ndarray) -> bool:
+    """Scale the force tau (3,) [N, ENU] by the lead, in place; return whether a limit acted.
+
+    least [N], above 0: smallest tau[Z], which tau has, too; largest [N]: of ||tau||; dt [s].
+    """
+    if lead.response <= 0.0:
+        return False
+    upward, made = tau[Z], lead.made[0]
+    if math.isnan(made):
+        made = upward
+    length = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1] + tau[2] * tau[2])
+    wanted = made + lead.lag / lead.response * (upward - made)
+    given = max(least, min(wanted, upward * largest / length))
+    for i in range(X, Z + 1):
+        tau[i] *= given / upward
+    lead.made[0] = made + (1.0 - math.exp(-dt / lead.lag)) * (given - made)
+    return given != wanted
 
 
 class ControllerArrays(NamedTuple):

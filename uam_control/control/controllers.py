@@ -19,6 +19,7 @@ from uam_control.control.around_law import (
     AttitudeArrays,
     ControllerArrays,
     PositionArrays,
+    RotorLead,
     begin_attitude,
     begin_law,
     end_arm,
@@ -36,7 +37,6 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
 )
-from uam_control.control.rotor_lead import RotorLead
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain
-from uam_control.arm.dynamics import vehicle_dynamics
 from uam_control.arm.floating import (
     TASK,
     Decoupled,
@@ -25,7 +24,7 @@ from uam_control.arm.floating import (
     task_jacobian,
     write_task,
 )
-from uam_control.arm.kinematics import ORIGIN
+from uam_control.arm.kinematics import ORIGIN, vehicle_dynamics
 from uam_control.control.arm_load import friction
 from uam_control.control.around_law import (
     ArmArrays,

@@ -22,6 +22,7 @@ from uam_control.estimation.filters import (
     low_pass_step,
     observer_step,
 )
+from uam_control.estimation.pose_clock import settled, suspend
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     FilterArrays,
@@ -32,7 +33,6 @@ from uam_control.estimation.pose_filter import (
     predict_next,
     wait,
 )
-from uam_control.estimation.pose_gate import settled, suspend
 from uam_control.estimation.waiting import insert
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import record

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import BRIDGED
-from uam_control.estimation.repeats import repeated
+from uam_control.estimation.pose_clock import repeated
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (

@@ -1,8 +1,14 @@
-"""Detection of a clock of the poses that has jumped: their stamps then say a wrong age.
+"""Poses that do not count: of a clock that has jumped, of a frozen tracker, or of a jump.
 
-A late pose has a right stamp, and stamps never go back. Poses whose clock is behind would be
-compared with an estimate of too early a time: the estimate leads, and the position loop swings up.
-Poses that are ahead while samples keep coming would count late.
+A frozen tracker repeats its last pose exactly, without noise. The stamps of a clock that has jumped
+say a wrong age. A late pose has a right stamp, and stamps never go back. Poses whose clock is
+behind would be compared with an estimate of too early a time: the estimate leads, and the position
+loop swings up. Poses that are ahead while samples keep coming would count late.
+
+The gate detects jumps only, as of another body taken for the vehicle. The estimate follows wrong
+poses that drift slowly; then the return to the true pose is the jump and must not be rejected. In
+that case motion capture and IMU contradict each other, and the estimated accelerometer bias is
+large: the gate then accepts all poses.
 """
 
 from __future__ import annotations
@@ -11,13 +17,47 @@ import math
 
 import numpy as np
 
-from uam_control.ages import AHEAD, AHEAD_FOR, usable
-from uam_control.maths.compiled import borrowing
-from uam_control.maths.memory import record
+from uam_control.ages import AHEAD, AHEAD_FOR, REJECTED, UNAIDED, usable
+from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.memory import Number, record
 
 # newest [s]: stamp of the newest pose that counted, age [s]: of that at its arrival; ahead_since
 # [s]: stamp of the IMU since which every pose is far ahead, inf: the last one was not
 WHOLE, REAL = "behind", "newest age ahead_since"
+POSITION, POSE = 3, 7
+CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
+MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
+# stamps [s]; rejecting_since: NaN while no pose is rejected
+GATE = "distance suspended last interrupted rejecting_since"
+
+
+class Repeats:
+    """Compares each pose with the last one; newest (7,): position and quaternion of that."""
+
+    def __init__(self) -> None:
+        self.newest = np.full(POSE, math.nan)
+        still, level = np.zeros(3), np.zeros(4)
+        self._repeated = prepared(repeated, still, level, self.newest)
+
+    def __call__(self, position: np.ndarray, quaternion: np.ndarray) -> bool:
+        """Return whether position (3,) and quaternion (4,) equal those of the last call exactly."""
+        return self._repeated(position, quaternion, self.newest)
+
+
+@borrowing
+def repeated(position: np.ndarray, quaternion: np.ndarray, newest: np.ndarray) -> bool:
+    """Return whether position (3,) and quaternion (4,) equal newest (7,) exactly; keep them there.
+
+    0 and -0 differ, as in their bytes.
+    """
+    same = True
+    for i in range(POSE):
+        value = position[i] if i < POSITION else quaternion[i - POSITION]
+        before = newest[i]
+        if value != before or math.copysign(1.0, value) != math.copysign(1.0, before):
+            same = False
+        newest[i] = value
+    return same
 
 
 class PoseClock:
@@ -69,3 +109,79 @@ def waits(clock: np.ndarray, stamp: float, newest: float) -> bool:
     m = clock[0]
     m.ahead_since = min(m.ahead_since, newest) if stamp - newest > AHEAD else math.inf
     return newest - m.ahead_since <= AHEAD_FOR
+
+
+class PoseGate:
+    """Decides for each pose whether to reject it; `refused`: number of rejected poses."""
+
+    refused, distance = Number(), Number()
+
+    def __init__(self, distance: float) -> None:
+        """distance [m]: from the estimate, above which a pose is rejected."""
+        self.memory = record("refused", GATE)
+        self.distance = distance
+        forget_rejections(self.memory)
+
+    def __call__(self, stamp: float, distance: float, bias: float) -> bool:
+        """See `rejects`."""
+        return rejects(self.memory, stamp, distance, bias, REJECTED)
+
+    def suspend(self, stamp: float) -> None:
+        """See `suspend`."""
+        suspend(self.memory, stamp)
+
+    def settled(self, stamp: float) -> bool:
+        """See `settled`."""
+        return settled(self.memory, stamp)
+
+
+@borrowing
+def forget_rejections(gate: np.ndarray) -> None:
+    """Begin anew; gate (1,): memory of a `PoseGate`."""
+    m = gate[0]
+    m.refused = 0
+    m.suspended = m.last = m.interrupted = -math.inf
+    m.rejecting_since = math.nan
+
+
+@borrowing
+def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float, longest: float) -> bool:
+    """Return whether to reject the pose at `stamp` [s]; gate: see `forget_rejections`.
+
+    distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
+    estimated accelerometer bias; longest [s]: of a rejection.
+    """
+    m = gate[0]
+    if stamp - m.last > UNAIDED:
+        suspend(gate, stamp)
+    elif math.isnan(m.rejecting_since) and bias > CONTRADICTED:
+        m.suspended = stamp
+    m.last = stamp
+    trusted = stamp - m.suspended > MEMORY
+    if not (distance > m.distance and trusted):
+        m.rejecting_since = math.nan
+        return False
+    if math.isnan(m.rejecting_since):
+        m.rejecting_since = stamp
+    if stamp - m.rejecting_since > longest:
+        m.rejecting_since = math.nan
+        suspend(gate, stamp)
+        return False
+    m.refused += 1
+    return True
+
+
+@borrowing
+def suspend(gate: np.ndarray, stamp: float) -> None:
+    """Reject no pose for MEMORY from `stamp` [s] on: the estimate may have a large error."""
+    m = gate[0]
+    m.suspended = m.interrupted = stamp
+
+
+@borrowing
+def settled(gate: np.ndarray, stamp: float) -> bool:
+    """Return whether the estimate at `stamp` [s] has recovered from the last interruption.
+
+    Until then the estimated biases change fast, by the return of the poses alone.
+    """
+    return stamp - gate[0].interrupted > MEMORY

@@ -14,11 +14,18 @@ import numpy as np
 
 from uam_control.ages import BRIDGED, FORWARDED, REJECTED, REJECTED_LATE
 from uam_control.coordinates import Z
-from uam_control.estimation.history import OLDEST_MATCH, value_at
-from uam_control.estimation.pose_clock import PoseClock, counts, forget_clock, waits
-from uam_control.estimation.pose_gate import PoseGate, forget_rejections, rejects
-from uam_control.estimation.repeats import Repeats, repeated
-from uam_control.estimation.waiting import drop_first, insert
+from uam_control.estimation.pose_clock import (
+    PoseClock,
+    PoseGate,
+    Repeats,
+    counts,
+    forget_clock,
+    forget_rejections,
+    rejects,
+    repeated,
+    waits,
+)
+from uam_control.estimation.waiting import OLDEST_MATCH, drop_first, insert, value_at
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (

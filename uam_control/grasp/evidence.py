@@ -1,4 +1,4 @@
-"""Evidence that the tool holds the payload.
+"""Evidence that the tool holds the payload, by the kind of the gripper.
 
 The motion capture of the payload decides where it is available: it measures the fact itself, for
 any mass. Without it the mass decides, identified twice: from the vertical force of the position law
@@ -9,13 +9,14 @@ fused by their variances.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import Sight
 from uam_control.vehicle import GRAVITY
+from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER
 
 LIFT_DEVIATION = 0.03  # [kg] of the mass from the force: vertical gusts during a lift
 TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
@@ -23,6 +24,8 @@ SHARE = 0.5  # of the tool's travel that the payload must follow
 LEAST_TRAVEL = 0.02  # [m] on which that is based at least
 
 REACH = 0.003  # [m] height above the payload below which the tool has contact
+SLACK = 0.1  # of the stroke, within which the fingers are at an end
+PRESSED = 0.5  # of the force limit: the fingers press on something
 
 
 class Evidence(NamedTuple):
@@ -118,3 +121,61 @@ def touches_beside(sight: Sight, distance: float) -> bool:
     """Return whether the tool touches a payload, at least `distance` [m] beside its middle."""
     away = sight.tool - sight.payload
     return bool(away[2] < REACH and np.hypot(*away[:2]) >= distance)
+
+
+class GripperKind(Protocol):
+    """One kind. `early`: it may act before the contact."""
+
+    early: bool
+
+    def held(self, sight: Sight, p: GraspParameters) -> Evidence:
+        """Return whether it holds something, as far as it feels it; "" without a measurement."""
+
+    def let_go(self, sight: Sight, p: GraspParameters) -> bool:
+        """Return whether it has let go what it held, as far as it feels it."""
+
+
+class Insensible:
+    """A gripper without a measurement of its own: an electromagnet, a suction cup."""
+
+    early = True
+
+    def held(self, sight: Sight, p: GraspParameters) -> Evidence:
+        """See `GripperKind`."""
+        return Evidence(None, "")
+
+    def let_go(self, sight: Sight, p: GraspParameters) -> bool:
+        """See `GripperKind`."""
+        return False
+
+
+class Fingers:
+    """Two fingers that report opening and force: closed without resistance, they hold nothing."""
+
+    early = False
+
+    def held(self, sight: Sight, p: GraspParameters) -> Evidence:
+        """See `GripperKind`."""
+        if math.isnan(sight.opening):
+            return Evidence(None, "fingers not measured")
+        text = f"fingers {1e3 * sight.opening:.0f} mm open, {sight.squeeze:.1f} N"
+        if self._part(sight, p) <= SLACK:
+            return Evidence(False, text)
+        return Evidence(True if sight.squeeze >= PRESSED * p.gripper_force else None, text)
+
+    def let_go(self, sight: Sight, p: GraspParameters) -> bool:
+        """See `GripperKind`."""
+        return self._part(sight, p) >= 1.0 - SLACK
+
+    @staticmethod
+    def _part(sight: Sight, p: GraspParameters) -> float:
+        """Return the part of the stroke by which they are open, 0..1."""
+        closed, opened = p.gripper_opening
+        return (sight.opening - closed) / (opened - closed)
+
+
+GRIPPERS: dict[str, GripperKind] = {
+    NO_GRIPPER: Insensible(),
+    MAGNET: Insensible(),
+    TWO_FINGER: Fingers(),
+}

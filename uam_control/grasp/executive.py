@@ -13,10 +13,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from uam_control.grasp.alignment import Alignment
-from uam_control.grasp.decisions import Grasp, GraspDecision
-from uam_control.grasp.directive import Directive, Step
+from uam_control.grasp.directive import Directive, Grasp, GraspDecision, Step
 from uam_control.grasp.evidence import (
+    GRIPPERS,
     Evidence,
+    GripperKind,
     Load,
     against,
     by_mass,
@@ -28,7 +29,6 @@ from uam_control.grasp.evidence import (
     touches_beside,
 )
 from uam_control.grasp.grasp_parameters import GraspParameters
-from uam_control.grasp.grippers import GRIPPERS, GripperKind
 from uam_control.grasp.sight import Lasting, RunningMean, Sight
 from uam_control.grasp.thrust_reserve import ThrustReserve, expected_throttle
 from uam_control.grasp.windows import FROM_ABOVE, GraspWindow

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain, carrying
-from uam_control.arm.dynamics import inverse_dynamics
+from uam_control.arm.kinematics import inverse_dynamics
 from uam_control.coordinates import (
     ALPHA,
     ARM,

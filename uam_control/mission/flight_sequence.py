@@ -13,9 +13,8 @@ from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.grasp import Grasp, GraspDecision
 from uam_control.maths.compiled import prepared
 from uam_control.maths.memory import Number, record
-from uam_control.mission.ground_pose import GroundPose
+from uam_control.mission.ground import GroundPose, Standing, Touchdown, on_ground
 from uam_control.mission.guidance import Guidance
-from uam_control.mission.magnet_override import MagnetOverride
 from uam_control.mission.mission_output import (
     ABORTED,
     GOAL,
@@ -30,13 +29,10 @@ from uam_control.mission.mission_parameters import MissionParameters, StartParam
 from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.nominal_tick import REAL, WHOLE
 from uam_control.mission.payload_watch import PayloadWatch
-from uam_control.mission.permission import ChecklistReport
 from uam_control.mission.plans import Goal
-from uam_control.mission.pre_arm import PreArm
+from uam_control.mission.pre_arm import ChecklistReport, PreArm
 from uam_control.mission.scenarios.scenario import Scenario
-from uam_control.mission.standing import Standing
-from uam_control.mission.steps import Steps
-from uam_control.mission.touchdown import Touchdown, on_ground
+from uam_control.mission.steps import MagnetOverride, Steps
 from uam_control.supervision import (
     Authority,
     Decision,

@@ -17,7 +17,7 @@ from uam_control.arm.placing import BEYOND, CLOSE, HINGE, TURNED, Placed, Room, 
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, ROLL, YAW, Z
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.motion.flyer import Flyer, flattened
+from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.mission.plan_limits import room
 from uam_control.mission.plans import (
     BOTH,

@@ -10,8 +10,8 @@ from uam_control.ages import SILENT
 from uam_control.coordinates import CHI, Z
 from uam_control.maths.compiled import borrowing
 from uam_control.mission.following import GuidanceArrays, follow_path
+from uam_control.mission.ground import on_ground
 from uam_control.mission.payload_watch import due
-from uam_control.mission.touchdown import on_ground
 from uam_control.supervision.checks import CheckArrays, measure_all
 from uam_control.supervision.observation import NUMBERS, ReadingArrays
 from uam_control.supervision.supervisor import stays_behind

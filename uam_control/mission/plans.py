@@ -24,7 +24,7 @@ from uam_control.coordinates import (
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
-from uam_control.mission.motion.quintics import quintic, quintic_at
+from uam_control.mission.motion.polynomials import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
 BOTH = slice(None)  # those of base and arm

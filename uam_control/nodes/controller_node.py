@@ -14,8 +14,8 @@ from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
 from uam_control.settings.parameter_set import ParameterError
-from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import LawStage
+from uam_control.stages.tick_stamps import carried, serves
 from uam_control.stages.timing import Timing
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
@@ -28,8 +28,8 @@ from uam_msgs_py.messages.control import (
     read_state,
 )
 from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.node_names import WHOLE_BODY
-from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Ahead, StampJoin

@@ -5,7 +5,7 @@ from rclpy.node import Node
 
 from uam_control.arm.hand import hands
 from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_scenario
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
 from uam_control.vehicle import (

@@ -24,8 +24,7 @@ from uam_control.mission import (
 )
 from uam_control.nodes.described import described_hand, described_scenario, described_vehicle
 from uam_control.nodes.mission_errors import TrackingErrors
-from uam_control.nodes.mission_inputs import MissionInputs
-from uam_control.nodes.mission_services import offer
+from uam_control.nodes.mission_inputs import MissionInputs, offer
 from uam_control.nodes.planner_inputs import PlannerInputs
 from uam_control.profiles.profile import (
     BRIDGE,
@@ -43,10 +42,10 @@ from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_control.supervision.setpoint_delay import margin_left
 from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import preflight_message
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
 from uam_msgs_py.messages.navigation import hand_message, path_message
-from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import (
     ERROR,
     OK,

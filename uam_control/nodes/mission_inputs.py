@@ -1,17 +1,32 @@
-"""Subscriptions of the mission node for the supervisor's limits.
+"""Subscriptions of the mission node for the supervisor's limits, and its services in flight.
 
 Messages stay serialized until `SupervisorInputs` reads them.
+
+| service | type | does |
+|---|---|---|
+| `~/start` | std_srvs/Trigger | arm and take off, if the pre-arm report is green |
+| `~/hold` | std_srvs/Trigger | stop on the path and hold the position |
+| `~/resume` | std_srvs/Trigger | continue on the path after a hold; regain a released vehicle |
+| `~/land` | std_srvs/Trigger | stop on a fast path, descend vertically and disarm |
+| `~/disarm` | std_srvs/Trigger | motors off: on the ground, or in failsafe |
+| `~/magnet` | std_srvs/SetBool | on or off until the scenario switches it next |
+
+The response contains the action of the next tick, or the reason why the command is refused.
 """
 
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Temperature
+from std_srvs.srv import SetBool, Trigger
 
+from uam_control.mission import Mission
 from uam_control.nodes.pose_source import PoseSource
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import SECOND
+from uam_control.supervision import OperatorCommand
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
     GRIPPER,
@@ -29,6 +44,12 @@ GAINS = (
     (topics.ATTITUDE_ADAPTATION, "attitude"),
     (topics.ARM_ADAPTATION, "arm"),
 )
+COMMANDS = {
+    command.name.lower(): command
+    for command in OperatorCommand
+    if command is not OperatorCommand.GOAL  # comes with a pose or trajectory, see planner_inputs
+}
+START, MAGNET = "start", "magnet"
 
 
 class MissionInputs:
@@ -106,3 +127,31 @@ class MissionInputs:
     def _on_gains(self, subsystem: str, data: bytes) -> None:
         stamp, names, values = read_values(data, "position")
         self._inputs.gains(stamp / SECOND, subsystem, names, values)
+
+
+def offer(node: Node, mission: Mission) -> None:
+    """Create the services of `mission` in `node`; they run between two ticks."""
+
+    def answer(
+        what: str, response: Trigger.Response | SetBool.Response, result: tuple[bool, str]
+    ) -> Trigger.Response | SetBool.Response:
+        response.success, response.message = result
+        node.get_logger().info(f"command {what}: {response.message}")
+        return response
+
+    def on_command(
+        name: str, command: OperatorCommand, request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return answer(name, response, mission.request(command))
+
+    def on_start(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return answer(START, response, mission.start())
+
+    def on_magnet(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        what = f"{MAGNET} {'on' if request.data else 'off'}"
+        return answer(what, response, mission.switch_magnet(request.data))
+
+    for name, command in COMMANDS.items():
+        node.create_service(Trigger, f"~/{name}", partial(on_command, name, command))
+    node.create_service(Trigger, f"~/{START}", on_start)
+    node.create_service(SetBool, f"~/{MAGNET}", on_magnet)

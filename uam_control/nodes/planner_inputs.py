@@ -29,7 +29,7 @@ from uam_control.maths.rotations import matrix_from_quaternion
 from uam_control.maths.vectors import rows
 from uam_control.mission import Mission
 from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.plans import Goal
 from uam_control.nodes.planner_messages import (
     check_frame,

@@ -19,10 +19,9 @@ from uam_control.stages.estimator_stage import EstimatorStage, estimator_stage
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints
+from uam_msgs_py.messages.convert import ImuWriter, TrajectoryWriter, read_imu, read_joints
 from uam_msgs_py.messages.navigation import hand_message, odometry_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.namespace import frame

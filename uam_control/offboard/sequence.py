@@ -34,11 +34,10 @@ import math
 from enum import Enum
 
 from uam_control.maths.memory import Number, record
-from uam_control.offboard.exchange import Reported, Request, commands_of
+from uam_control.offboard.exchange import Reasons, Reported, Request, commands_of
 from uam_control.offboard.firmware import firmware
 from uam_control.offboard.modes import MavResult, Mode, Severity, result_word
 from uam_control.offboard.offboard_parameters import OffboardParameters
-from uam_control.offboard.reasons import Reasons
 from uam_control.settings.plain_members import plain_members
 
 LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T

@@ -13,7 +13,7 @@ import numpy as np
 from uam_control.coordinates import CHI, X, Y, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Known, Number, record
-from uam_control.setpoints.desired import Desired
+from uam_control.setpoints.targets import Desired
 from uam_control.settings.parameter_set import ParameterSet, number
 
 _LAST = 0.05  # s before the end, rates 0: the autopilot holds the last setpoint until its failsafe

@@ -26,11 +26,10 @@ import numpy as np
 from uam_control.ages import STALE
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_euler
-from uam_control.setpoints.desired import Desired, SetpointType, Target, level
 from uam_control.setpoints.level_hold import UNKNOWN, HoldParameters, LevelHold
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, SetpointRefused
 from uam_control.setpoints.setpoint_types import attitude_setpoint, rates_setpoint
-from uam_control.setpoints.targets import STILL
+from uam_control.setpoints.targets import STILL, Desired, SetpointType, Target, level
 
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
 # [rad/s] largest body rates that are kept for a released vehicle; a pilot yaws faster than it rolls

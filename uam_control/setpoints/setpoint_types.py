@@ -18,12 +18,14 @@ import numpy as np
 from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_control.setpoints.desired import Desired, SetpointType, Target
 from uam_control.setpoints.targets import (
     RATES,
     UPRIGHT,
     AttitudeTarget,
+    Desired,
     PositionTarget,
+    SetpointType,
+    Target,
     WrenchTarget,
 )
 from uam_control.settings.parameter_set import ParameterSet, choice, number

@@ -1,5 +1,6 @@
-"""Setpoints as MAVLink has them: attitude or body rates, motion, torque; which of each are flown.
+"""What an autopilot is given: the desired motion, a setpoint made of a part of it, and poses.
 
+Setpoints are as MAVLink has them: attitude or body rates, motion, torque; which are flown:
 SET_ATTITUDE_TARGET:
 
 | type_mask | ignored | flown |
@@ -22,10 +23,13 @@ MavlinkReceiver.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.coordinates import CHI, Z
 from uam_control.frames import swap_body
 
 RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE = 128, 7, 3  # type masks
@@ -133,3 +137,47 @@ class WrenchTarget(NamedTuple):
     def refused(self) -> str:
         """Return why no autopilot should fly it: what is not finite; "" if nothing."""
         return "" if math.isfinite(self.torque.sum() + self.thrust) else "not finite"
+
+
+@dataclass(slots=True)
+class Desired:
+    """The desired motion, from the control laws or from the level hold.
+
+    rates (3,): body rates that make tau_q in the autopilot's rate loop [rad/s, FLU]; attitude
+    (3, 3): rows q_d = roll, pitch, yaw [rad, FLU in ENU], Omega_d [rad/s], Omega_d_dot [rad/s^2],
+    both in the desired body frame (FLU); thrust: 0..1; reference (3, 3): rows position [m],
+    velocity [m/s], acceleration [m/s^2] of the mission, ENU; torque (3,): tau_q in parts of the
+    largest torque, FLU; None: there is none.
+    """
+
+    rates: np.ndarray
+    attitude: np.ndarray
+    thrust: float
+    reference: np.ndarray | None = None
+    torque: np.ndarray | None = None
+
+
+# A setpoint type returns the part of the desired motion that is sent, in the autopilot's frames.
+Target = AttitudeTarget | PositionTarget | WrenchTarget
+SetpointType = Callable[[Desired], Target]
+
+
+def level(yaw: float) -> np.ndarray:
+    """Return `Desired.attitude` (3, 3) of a level vehicle at rest with `yaw` [rad]."""
+    attitude = np.zeros((3, 3))
+    attitude[CHI, Z] = yaw
+    return attitude
+
+
+class VisionPose(NamedTuple):
+    """A mocap pose for the autopilot.
+
+    stamp [s]; position (3,) [m, ENU]; quaternion (4,) [w x y z], FLU → ENU; standard deviations [m]
+    and [rad].
+    """
+
+    stamp: float
+    position: np.ndarray
+    quaternion: np.ndarray
+    position_deviation: float
+    attitude_deviation: float

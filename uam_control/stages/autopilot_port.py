@@ -1,4 +1,4 @@
-"""The interface between the bridge and an autopilot.
+"""The interface between the bridge and an autopilot, and the bridge's report of it.
 
 | port | used by |
 |---|---|
@@ -8,12 +8,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from uam_control.maths.memory import Number, record
 from uam_control.offboard.modes import Mode
-from uam_control.setpoints.desired import Target
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.offboard.sequence import OffboardSequence, Phase
+from uam_control.setpoints.loop_delay import LoopDelay
+from uam_control.setpoints.targets import Target, VisionPose
+from uam_control.stamps import SECOND, nanoseconds
+
+REPORT_PERIOD = 200_000_000  # [ns]
+KILL_SWITCH = "the kill switch is engaged, or flight termination is active"
 
 
 class PortSteps(NamedTuple):
@@ -82,3 +89,91 @@ class AutopilotPort(Protocol):
     def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
         ...
+
+
+class AutopilotReport(NamedTuple):
+    """The autopilot's state as received by a tick.
+
+    reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
+    companion, "" if nobody has; landed: by the autopilot's land detector; failed: why the bridge
+    flies no more, "" while it may; stopped: a kill has ended the flight; lands: the autopilot's
+    mode lands by itself, or it is silent, and may do so; armed_since [ns]: first
+    tick with an armed autopilot, None while disarmed; round_trip, loop_delay [s]: None if unknown.
+    """
+
+    connected: bool
+    mode: Mode
+    armed: bool
+    phase: Phase
+    reasons: tuple[str, ...]
+    released_to: str = ""
+    landed: bool = False
+    failed: str = ""
+    stopped: bool = False
+    lands: bool = False
+    armed_since: int | None = None
+    round_trip: float | None = None
+    loop_delay: float | None = None
+
+    def differs(self, other: AutopilotReport | None) -> bool:
+        """Whether a field other than `armed_since` and the delays differs from `other`."""
+        return other is None or self[:10] != other[:10]
+
+
+class AutopilotReports:
+    """Makes the reports when they are due. `last`: the newest one."""
+
+    _due = Number()
+
+    def __init__(
+        self, autopilot: AutopilotPort, sequence: OffboardSequence, loop_delay: LoopDelay
+    ) -> None:
+        self._autopilot, self._sequence = autopilot, sequence
+        self._loop_delay = loop_delay
+        self.memory = record("due")  # [ns]
+        self._due = -1
+        self._reported: tuple | None = None  # what a change of brings a report
+        self.last: AutopilotReport | None = None
+
+    def due(self, stamp: int) -> AutopilotReport | None:
+        """Return the report that is due at the tick `stamp` [ns], None for none."""
+        what = self._what(stamp)
+        if stamp < self._due and what == self._reported:
+            return None
+        autopilot = self._autopilot
+        since, delay = autopilot.armed_since, self._loop_delay.value
+        self._due, self._reported = stamp + REPORT_PERIOD, what
+        self.last = AutopilotReport(
+            *what,
+            None if since is None else nanoseconds(since),
+            autopilot.round_trip,
+            None if math.isnan(delay) else delay,
+        )
+        return self.last
+
+    @property
+    def next(self) -> int:
+        """The stamp [ns] from which on the next report is due, even if nothing changes."""
+        return self._due
+
+    def settled(self, stamp: int) -> bool:
+        """Return whether the autopilot is connected at the tick `stamp` [ns], and all is reported
+        but the time."""
+        what = self._what(stamp)
+        return what[0] and what == self._reported
+
+    def _what(self, stamp: int) -> tuple:
+        """Return what a change of brings a report at the tick `stamp` [ns]; `connected` first."""
+        autopilot, sequence = self._autopilot, self._sequence
+        return (
+            autopilot.connected(stamp / SECOND),
+            autopilot.mode,
+            autopilot.armed,
+            sequence.phase,
+            sequence.reasons,
+            sequence.released_to,
+            autopilot.landed,
+            sequence.failure or (KILL_SWITCH if autopilot.killed else ""),
+            sequence.stopped,
+            autopilot.mode.lands or autopilot.silent(stamp / SECOND),
+        )

@@ -40,8 +40,12 @@ from uam_control.setpoints.setpoint_source import (
 from uam_control.setpoints.setpoint_types import SetpointParameters, rates_setpoint
 from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
-from uam_control.stages.autopilot_port import AutopilotPort, PortSteps
-from uam_control.stages.autopilot_report import AutopilotReport, AutopilotReports
+from uam_control.stages.autopilot_port import (
+    AutopilotPort,
+    AutopilotReport,
+    AutopilotReports,
+    PortSteps,
+)
 from uam_control.stages.flight_measurements import (
     FlightMeasurements,
     MeasurementArrays,

@@ -24,7 +24,7 @@ from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.mission.nominal_tick import watch_due
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
-from uam_control.stages.autopilot_report import AutopilotReport
+from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.bridge_stage import BridgeStage, sending
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.hand_stage import HandStage, hand_step

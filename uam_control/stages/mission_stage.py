@@ -13,9 +13,9 @@ from uam_control.maths.memory import Number, record
 from uam_control.mission import Mission
 from uam_control.mission.following import MOST
 from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
-from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs
+from uam_control.stages.tick_stamps import carried, serves
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, Readings, State

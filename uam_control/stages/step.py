@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, prepared
-from uam_control.maths.hooks import Hook, call, compiled_hook, python_hook, table
+from uam_control.maths.kept_tuple import Hook, call, compiled_hook, python_hook, table
 
 # what a compiled step says. DECIDE: it has changed nothing; ENDED: the tick has no state; ASK: it
 # is done, and the next stage comes after a question to the objects

@@ -10,11 +10,10 @@ import numpy as np
 
 from uam_control.ages import FORWARDED
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT
-from uam_control.estimation.pose_clock import PoseClock, counts
-from uam_control.estimation.repeats import Repeats, repeated
+from uam_control.estimation.pose_clock import PoseClock, Repeats, counts, repeated
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import put, record
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import VisionPose
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.autopilot_port import AutopilotPort
 

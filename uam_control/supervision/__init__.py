@@ -1,6 +1,5 @@
 """Supervision of a flight: limits, states, and the reaction of the vehicle in each state."""
 
-from uam_control.supervision.decision import Decision, Guide, StateTransition
 from uam_control.supervision.inputs import Inputs
 from uam_control.supervision.observation import (
     Authority,
@@ -9,6 +8,6 @@ from uam_control.supervision.observation import (
     Readings,
 )
 from uam_control.supervision.preflight import PreflightCheck, preflight
-from uam_control.supervision.states import ORDINARY, Event, State
+from uam_control.supervision.states import ORDINARY, Decision, Event, Guide, State, StateTransition
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.supervision.supervisor import Supervisor

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import STALE
-from uam_control.estimation.repeats import Repeats, repeated
+from uam_control.estimation.pose_clock import Repeats, repeated
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Known, Number, put, record
 from uam_control.supervision.observation import ReadingArrays, Readings

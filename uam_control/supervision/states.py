@@ -1,4 +1,4 @@
-"""States, events and transitions of a supervised flight, as data.
+"""States, events and transitions of a supervised flight, as data, and what is decided at a tick.
 
 There are no other transitions than those of `TRANSITIONS`. docs/supervision.md shows them as a
 diagram; a test compares the two.
@@ -173,3 +173,40 @@ AIRBORNE_STATES = (
     State.BLIND,
     State.FAILSAFE,
 )
+
+
+@plain_members
+class Guide(Enum):
+    """Behaviour of the reference."""
+
+    NOTHING = "no reference for position and attitude"
+    SCENARIO = "follows the scenario"
+    STOP = "stops on the scenario's path and stays there"
+    DESCEND = "descends vertically"
+
+
+class Decision(NamedTuple):
+    """The supervisor's output.
+
+    cause: why the state was entered. arm: desired arming of the autopilot. keep_magnet: an
+    energised magnet stays energised; stow: the arm moves to its landing angles. Both apply only if
+    the guide is not SCENARIO. regains: number of commands so far to regain a released vehicle.
+    """
+
+    state: State
+    cause: str
+    guide: Guide
+    arm: bool
+    keep_magnet: bool
+    stow: bool
+    regains: int
+
+
+class StateTransition(NamedTuple):
+    """A transition at `stamp` [s]."""
+
+    stamp: float
+    source: State
+    target: State
+    event: Event
+    cause: str

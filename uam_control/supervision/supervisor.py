@@ -26,11 +26,19 @@ from uam_control.supervision.checks import (
     Checks,
     ExceededLimit,
 )
-from uam_control.supervision.decision import Decision, Guide, StateTransition
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
-from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
+from uam_control.supervision.states import (
+    AIRBORNE_STATES,
+    ORDINARY,
+    TARGETS,
+    Decision,
+    Event,
+    Guide,
+    State,
+    StateTransition,
+)
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 TOO_HEAVY = "no lift-off: too little thrust for the weight"

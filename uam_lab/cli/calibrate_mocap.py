@@ -84,7 +84,7 @@ def add(commands: Subcommands) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure, compute and write the calibration; return the exit status."""
     from uam_sim_bridge.devices.mocap import calibration, measurement
-    from uam_sim_bridge.devices.mocap.fit import fit
+    from uam_sim_bridge.devices.mocap.calibration import fit
 
     standing = options.height if options.height is not None else _standing(_vehicle(options))
     found = _recorded(options) if options.log else _measured(options)
@@ -113,11 +113,11 @@ def _standing(vehicle: VehicleDescription) -> float:
 
 def _recorded(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     """Return the first and the last place of a recording at which the vehicle stands still."""
-    from uam_sim_bridge.devices.mocap import raw_log
+    from uam_sim_bridge.devices.mocap import measurement
     from uam_sim_bridge.devices.mocap.frame import MocapError
     from uam_sim_bridge.devices.mocap.measurement import places
 
-    found = places(raw_log.read(options.log), min(1.0, options.duration))
+    found = places(measurement.read_poses(options.log), min(1.0, options.duration))
     if len(found) < 2:
         raise MocapError(
             f"{options.log}: {len(found)} places where the vehicle stands still, 2 are needed"
@@ -140,18 +140,18 @@ def _parameters(options: argparse.Namespace) -> MocapParameters:
 
 def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     """Guide through the two places and measure at each."""
-    from uam_sim_bridge.devices.mocap import live, measurement, raw_log
+    from uam_sim_bridge.devices.mocap import measurement
 
     parameters = _parameters(options)
     body = parameters.body
     source = open_source(parameters)
     found: dict[str, list[TimedPose]] = {}
     try:
-        live.until_known(source, body)
+        measurement.until_known(source, body)
         say(f"measures '{body}' of {source.description}")
         for what, step in STEPS.items():
             _confirm(step)
-            found[what] = live.measure(source, body, options.duration)
+            found[what] = measurement.tracked_poses(source, body, options.duration)
             place = measurement.still(found[what], what)
             say(
                 f"   {place.count} poses, spread {1e3 * place.spread:.2f} mm, "
@@ -160,7 +160,9 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     finally:
         source.close()
         if options.save and found:
-            raw_log.write(options.save, [pose for poses in found.values() for pose in poses])
+            measurement.write_poses(
+                options.save, [pose for poses in found.values() for pose in poses]
+            )
     return found
 
 

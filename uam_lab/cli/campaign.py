@@ -85,8 +85,8 @@ def run(options: argparse.Namespace) -> int:
         return _replay(draws[numbers[0]], numbers[0], options.out)
 
     from uam_lab.experiments.campaign import report
+    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
-    from uam_lab.experiments.trials.inputs import inputs
 
     out = make_folder(options.out, "campaign")
     given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}

@@ -16,18 +16,28 @@ was accepted; 1 items are open, or it was refused; 2 no flight or wrong use.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
 
 from uam_lab.cli.command import Command, Subcommands, guest_of
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.terminal import Terminal, say
+from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem
+from uam_msgs_py.messages.status import ChecklistState
 
 if TYPE_CHECKING:
     from uam_lab.flights.operator import Operator
 
-PASSED, OPEN = 0, 1  # exit status
+DONE, OPEN_ITEMS = 0, 1  # exit status
 SHOW, CONFIRM, REPEAT, LIVE = "show", "confirm", "repeat", "live"
 PERIOD = 0.2  # [s] between two pictures
+MARKS = {PASSED: ("ok", "green"), FAILED: ("FAIL", "bold red"), OPEN: ("open", "yellow")}
+KEYS = "c or Enter: confirm    r: repeat    q: quit"
 
 
 def add(commands: Subcommands) -> None:
@@ -56,22 +66,20 @@ def run(options: argparse.Namespace) -> int:
 def _command(operator: Operator, name: str) -> int:
     accepted, text = operator.checklist_command(name)
     say(text)
-    return PASSED if accepted else OPEN
+    return DONE if accepted else OPEN_ITEMS
 
 
 def _show(operator: Operator) -> int:
-    from uam_lab.cli.checklist_view import drawn
 
     state, items = operator.checklist()
     Terminal().print(drawn(state, items))
-    return PASSED if state.passed else OPEN
+    return DONE if state.passed else OPEN_ITEMS
 
 
 def _live(operator: Operator) -> int:
     """Draw the checklist until q is pressed, or without a terminal until all items have passed."""
     from rich.live import Live
 
-    from uam_lab.cli.checklist_view import drawn
     from uam_lab.cli.keys import Keys
 
     answer = ""
@@ -88,4 +96,51 @@ def _live(operator: Operator) -> int:
             live.update(drawn(state, items, answer, live=True, keys=keys.available))
             if state.passed and not keys.available:
                 break
-    return PASSED if state.passed else OPEN
+    return DONE if state.passed else OPEN_ITEMS
+
+
+def drawn(
+    state: ChecklistState,
+    items: Sequence[ChecklistItem],
+    answer: str = "",
+    live: bool = False,
+    keys: bool = False,
+) -> RenderableType:
+    """Return the present step above the table of items.
+
+    answer: of the last command; live: passed automatic items are only counted, as a terminal is not
+    high; keys: whether they are explained.
+    """
+    parts: list[RenderableType] = [_step(state)]
+    if keys:
+        parts.append(Text(KEYS, style="dim"))
+    if answer:
+        parts.append(Text(answer))
+    fine = [one for one in items if one.kind == "automatic" and one.result == PASSED]
+    if live and fine:
+        parts.append(Text(f"{len(fine)} automatic items pass", style="green"))
+        items = [one for one in items if one not in fine]
+    return Group(*parts, _table(state, items))
+
+
+def _step(state: ChecklistState) -> Panel:
+    if state.passed:
+        return Panel("All items have passed: uam start is allowed.", style="green")
+    if not state.step:
+        return Panel(Text(f"Waiting for: {state.failing}"), title="automatic items", style="yellow")
+    lines = [Text(state.instruction, style="bold"), Text(state.seen)]
+    if state.needs == "confirm":
+        lines.append(Text("Confirm when it is done.", style="bold yellow"))
+    return Panel(Group(*lines), title=Text(state.step), style="red" if state.failed else "cyan")
+
+
+def _table(state: ChecklistState, items: Sequence[ChecklistItem]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("", "item", "value", "limit"):
+        table.add_column(name, overflow="fold")
+    for item in items:
+        mark, style = MARKS[item.result]
+        if item.name == state.step:
+            mark, style = "-->", "bold cyan" if not state.failed else "bold red"
+        table.add_row(Text(mark, style=style), item.name, item.value, item.limit)
+    return table

@@ -77,8 +77,8 @@ def _about(result: TrialResult) -> str:
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
     from uam_lab.experiments.compare import comparison_report, modularity
+    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
-    from uam_lab.experiments.trials.inputs import inputs
 
     if options.engine == "ros":
         require_ros()

@@ -36,10 +36,10 @@ def add(commands: Subcommands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the tables; return the exit status."""
-    from uam_lab.experiments.duel import report
+    from uam_lab.experiments.duel import flights
     from uam_lab.experiments.duel.flights import ROWS, load_duel, measure, trials
+    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
-    from uam_lab.experiments.trials.inputs import inputs
 
     duel = load_duel(options.name, tuple(options.rows or ()))
     seeds = options.seeds or duel.seeds
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     of = inputs(duel.vehicle, duel.scenarios[0], given)
     experiment = Experiment("duel", table, ROWS, of, place_of(options), measure)
     found = experiment.fly(range(len(planned)), planned.__getitem__, _about)
-    text = report.text(duel, list(found.values()))
+    text = flights.tables(duel, list(found.values()))
     write_text(out / "tables.md", f"{text}\nMade by `{command_line()}`.\n")
     say(text)
     say(f"results  {out}")

@@ -91,8 +91,8 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.faults import matrix as fault_matrix
     from uam_lab.experiments.faults import report
     from uam_lab.experiments.faults.trial import ROWS
+    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
-    from uam_lab.experiments.trials.inputs import inputs
 
     place = place_of(options)
     check_clock(options.engine, options.clock)

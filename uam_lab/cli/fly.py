@@ -144,7 +144,7 @@ def missed_margins(settings: FlightSettings) -> tuple[str, ...]:
     own = profile.name == settings.vehicle.profile(settings.controller)
     if settings.foreign or (own and settings.vehicle.file.is_relative_to(shipped)):
         return ()
-    from uam_lab.experiments.margins.kept import missed
+    from uam_lab.experiments.margins.cases import missed
 
     return missed(profile, sorted({0.0, settings.payload_mass}))
 

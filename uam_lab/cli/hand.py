@@ -121,7 +121,7 @@ def _fk(vehicle: VehicleDescription, chain: Chain, options: argparse.Namespace) 
 
 
 def _ik(vehicle: VehicleDescription, chain: Chain, options: argparse.Namespace) -> dict[str, Any]:
-    from uam_control.arm.inverse import angles_for
+    from uam_control.arm.hand import angles_for
 
     q, distance = angles_for(chain, np.array(options.position), *_ranges(vehicle))
     return _posture(vehicle, chain, q) | {"distance_m": distance}
@@ -130,13 +130,13 @@ def _ik(vehicle: VehicleDescription, chain: Chain, options: argparse.Namespace) 
 def _workspace(
     vehicle: VehicleDescription, chain: Chain, options: argparse.Namespace
 ) -> dict[str, Any]:
-    from uam_control.arm.inverse import reached
-    from uam_lab.report.figures.workspace import draw
+    from uam_control.arm.hand import reached
+    from uam_lab.report.figures.hand_figures import draw_workspace
 
     places = reached(chain, *_ranges(vehicle), POSTURES)
     found = {"lowest_m": places.min(axis=0).tolist(), "highest_m": places.max(axis=0).tolist()}
     if options.out is not None:
-        draw(options.out, vehicle.name, places)
+        draw_workspace(options.out, vehicle.name, places)
         found["picture"] = str(options.out)
     return found
 

@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 
 from uam_control.arm.chain import carrying
-from uam_control.arm.dynamics import gravity_torque
+from uam_control.arm.kinematics import gravity_torque
 from uam_control.vehicle import chain_of
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, Subcommands, number

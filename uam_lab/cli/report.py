@@ -79,7 +79,7 @@ def several(options: argparse.Namespace) -> int:
     from uam_lab.records.rebuild import series_of
     from uam_lab.report.figures.panels import DrawnFlight
     from uam_lab.report.page.console import reporting
-    from uam_lab.report.page.overlay import build_overlay, labelled
+    from uam_lab.report.page.pages import build_overlay, labelled
 
     names = labelled(options.directories)
     flights = [

@@ -30,8 +30,7 @@ from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, given_profile, place_of
 from uam_lab.experiments.trials.counting import Counting
-from uam_lab.experiments.tuning.convergence import LEAST, SMALL
-from uam_lab.experiments.tuning.convergence import in_words as convergence
+from uam_lab.experiments.tuning.front import LEAST, SMALL, convergence
 from uam_lab.experiments.tuning.space import TuningError, load_space
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.direct.warm_up import prepare

@@ -40,7 +40,7 @@ def add(commands: Subcommands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Design, write and print; return the exit status."""
-    from uam_lab.experiments.design import files, search, table
+    from uam_lab.experiments.design import files, search
     from uam_lab.experiments.design.criteria import load_criteria
 
     described = load_description(options.name)
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     written = files.files_of(described, folder or described.file.parent)
     made = search.design(described, criteria, say)
     files.write(made, written)
-    say(table.text(made))
+    say(files.table(made))
     for file in written.values():
         say(f"written  {file}")
     numbers = described.numbers

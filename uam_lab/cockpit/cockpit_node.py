@@ -17,9 +17,9 @@ from uam_control.settings.parameter_set import ParameterError, ParameterSet, int
 from uam_lab.cockpit import web
 from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
-from uam_lab.cockpit.plain_page import PlainPage
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
+from uam_lab.cockpit.web import PlainPage
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from uam_lab.cockpit.commands import Later, Said
-from uam_lab.cockpit.remote_parameters import About, RemoteParameters
+from uam_lab.cockpit.services import About, RemoteParameters
 from uam_lab.cockpit.texts import shown
 
 REACH = 4.0  # end of a slider / initial value

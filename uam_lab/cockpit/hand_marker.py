@@ -11,7 +11,7 @@ import viser
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, POSITION, Z
 from uam_control.mission import MissionParameters
 from uam_control.mission.hand_goals import HandPose
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.plans import PlanRefused
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleDescription

@@ -16,24 +16,22 @@ from uam_control.coordinates import ARM
 from uam_control.supervision import PreflightCheck
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.charts import Charts
-from uam_lab.cockpit.checklist_panel import ChecklistPanel
 from uam_lab.cockpit.commands import BUTTONS, GOAL, Button, Commands, Later
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.hand_marker import HandMarker
-from uam_lab.cockpit.headline import headline
-from uam_lab.cockpit.plain_page import PlainPage
-from uam_lab.cockpit.remote_parameters import RemoteParameters
-from uam_lab.cockpit.services import Services
+from uam_lab.cockpit.headline import ChecklistPanel, headline
+from uam_lab.cockpit.services import RemoteParameters, Services
 from uam_lab.cockpit.texts import shown
 from uam_lab.cockpit.vehicle_health import Health
 from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
+from uam_lab.cockpit.web import PlainPage
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.parameter_changes import ParameterChange
-from uam_msgs_py.messages.preflight import read_preflight
+from uam_msgs_py.messages.checklist import read_preflight
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.messages.tf_message import read_transforms
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.messages.transforms import read_transforms
 from uam_msgs_py.node.namespace import prefix
 
 # nodes whose parameters are shown, and what their tabs are called

@@ -42,8 +42,8 @@ from uam_msgs_py.messages.control import (
 )
 from uam_msgs_py.messages.convert import JointStateWriter, read_pose
 from uam_msgs_py.messages.status import ERROR, OK, MissionStatus
+from uam_msgs_py.messages.tf_message import Transform, transforms_message
 from uam_msgs_py.messages.topics import BODY, WORLD
-from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParametersAtomically,
+)
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
+from uam_control.settings.parameter_file import ROS_OWN
 from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.node_parameters import plain
 
 PATIENCE = 3.0  # [s] of wall time for an answer
 
@@ -66,3 +77,94 @@ class Services:
                 answer(None, f"{client.srv_name}: no response")
             else:
                 self._open.append((client, future, end, answer))
+
+
+@dataclass(frozen=True)
+class About:
+    """Description of one parameter. choices: the allowed words, () for other types."""
+
+    name: str
+    description: str
+    constraints: str
+    choices: tuple[str, ...]
+    low: float | None
+    high: float | None
+    read_only: bool
+
+
+class RemoteParameters:
+    """Parameters of one node. `known` contains their descriptions after `load`."""
+
+    def __init__(self, services: Services, node: str):
+        self.node = node
+        self.known: dict[str, About] = {}
+        self.values: dict[str, Any] = {}
+        self._services = services
+
+    def _call(self, kind: type, service: str, request: Any, answer: Answer) -> None:
+        self._services.call(kind, f"{self.node}/{service}", request, answer)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the node offers its parameters."""
+        return self._services.ready(ListParameters, f"{self.node}/list_parameters")
+
+    def load(self, done: Callable[[str], None]) -> None:
+        """Request descriptions and values; then call done(""), or done(reason) on failure."""
+
+        def listed(response: ListParameters.Response | None, why: str) -> None:
+            if why:
+                done(why)
+                return
+            names = sorted(n for n in response.result.names if not n.startswith(ROS_OWN))
+            request = DescribeParameters.Request(names=names)
+            self._call(DescribeParameters, "describe_parameters", request, described)
+
+        def described(response: DescribeParameters.Response | None, why: str) -> None:
+            if why:
+                done(why)
+                return
+            self.known = {one.name: _about(one) for one in response.descriptors}
+            self.refresh(done)
+
+        self._call(ListParameters, "list_parameters", ListParameters.Request(), listed)
+
+    def refresh(self, done: Callable[[str], None]) -> None:
+        """Request the values again; then call done(""), or done(reason) on failure."""
+        names = list(self.known)
+
+        def got(response: GetParameters.Response | None, why: str) -> None:
+            if not why:
+                for name, value in zip(names, response.values, strict=True):
+                    self.values[name] = plain(value)
+            done(why)
+
+        self._call(GetParameters, "get_parameters", GetParameters.Request(names=names), got)
+
+    def set(self, changes: Mapping[str, Any], done: Callable[[str], None]) -> None:
+        """Request changes as a whole; then call done(""), or done(reason) if refused."""
+
+        def answered(response: SetParametersAtomically.Response | None, why: str) -> None:
+            if not why and not response.result.successful:
+                why = response.result.reason or "refused without a reason"
+            if not why:
+                self.values.update(changes)
+            done(why)
+
+        messages = [Parameter(name, value=v).to_parameter_msg() for name, v in changes.items()]
+        request = SetParametersAtomically.Request(parameters=messages)
+        self._call(SetParametersAtomically, "set_parameters_atomically", request, answered)
+
+
+def _about(said: ParameterDescriptor) -> About:
+    span = said.floating_point_range
+    _, marked, words = said.additional_constraints.partition("one of: ")
+    return About(
+        said.name,
+        said.description,
+        said.additional_constraints,
+        tuple(words.split(", ")) if marked else (),
+        span[0].from_value if span else None,
+        span[0].to_value if span else None,
+        said.read_only,
+    )

@@ -14,8 +14,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.tf_message import Transform
 from uam_msgs_py.messages.topics import WORLD
-from uam_msgs_py.messages.transforms import Transform
 
 GREY = (0.6, 0.6, 0.6, 1.0)
 REFERENCE = "reference"  # frame of the desired pose

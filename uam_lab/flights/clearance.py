@@ -1,4 +1,7 @@
-"""How near the reference brings the vehicle to what stands around it."""
+"""Whether a vehicle stands free as a flight begins and ends, and how near its reference comes.
+
+On the ground its arm is above its feet, and beside what stands around it.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,15 @@ from uam_control.coordinates import ARM, CHI, CHI_DDOT, POSITION, YAW, Z
 from uam_control.grasp import grasp_windows
 from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_control.mission import Scenario
+from uam_control.mission import Scenario, ScenarioError
 from uam_control.mission.motion.flatness import attitudes
 from uam_control.mission.motion.trajectory import reference_rows
 from uam_control.mission.scenarios.environment import PAYLOAD, default_environment
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
-from uam_sim_bridge.plant.arm_geometry import BASE
-from uam_sim_bridge.plant.surroundings import VEHICLE, Entry, distance, shapes
+from uam_sim_bridge.plant.arm_geometry import BASE, room_below
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT
+from uam_sim_bridge.plant.surroundings import VEHICLE, Entry, distance, overlapping, shapes
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 STEP = 0.05  # [s] between two poses
@@ -27,6 +31,60 @@ MOST = 4000  # poses of a long flight
 NEAR = 0.05  # [m] that the errors of a flight may need
 BESIDE = 0.04  # [m] of a tool from where it grips, that its alignment with a payload mends
 GRIPS = 10.0, 8.0  # [s] before and after a switch of the gripper: it works at what stands there
+SINKS = 0.005  # [m] by which an arm may reach below the feet: a gear and a floor give way
+
+
+def check_standing(
+    vehicle: VehicleDescription, scenario: Scenario, plant: str = DEFAULT_PLANT
+) -> None:
+    """Raise VehicleError or ScenarioError if the arm reaches through the ground.
+
+    Checked are the stowed arm, that of the take-off and that of the landing. An MJCF that does not
+    compile is refused, too; a plant that is not MuJoCo's may accept it.
+    """
+    try:
+        model = Vehicle.of(vehicle).compile(0.0)
+    except VehicleError:
+        if plant == DEFAULT_PLANT:
+            raise
+        return
+    _check_surroundings(vehicle, scenario)
+    start = standing(scenario.arm_start)
+    flown = scenario.begun_at(start)
+    end = flown.landing.end
+    last = reference_rows(flown.trajectory(start), np.array([end]), len(vehicle.joints))
+    told = ScenarioError, f"scenario {scenario.name}:"
+    for (error, where), what, angles in (
+        ((VehicleError, f"{vehicle.file}: joints:"), "stowed", vehicle.stowed),
+        (told, "arm_start", scenario.arm_start),
+        (told, "landing", last[CHI, 0, ARM]),
+    ):
+        room = room_below(model, vehicle.joint_names, angles)
+        if room is not None and room < -SINKS:
+            raise error(
+                f"{where} {what}: with joints at {_degrees(angles)} deg the arm reaches "
+                f"{-room:.3f} m below the feet; it must stay above them on the ground"
+            )
+
+
+def _check_surroundings(vehicle: VehicleDescription, scenario: Scenario) -> None:
+    """Raise ScenarioError if entries of `environment` intersect each other or the vehicle."""
+    if not scenario.environment:
+        return
+    model = Vehicle.of(vehicle).changed(scenario.surroundings).compile(0.0)
+    data = mujoco.MjData(model)
+    for name, angle in zip(vehicle.joint_names, scenario.arm_start, strict=True):
+        data.joint(name).qpos = angle
+    found = overlapping(model, data, scenario.environment, SINKS)
+    if found is not None:
+        one, other, depth = found
+        raise ScenarioError(
+            f"scenario {scenario.name}: environment: {one} and {other} intersect by {depth:.3f} m"
+        )
+
+
+def _degrees(angles: Sequence[float]) -> str:
+    return ", ".join(f"{angle:.0f}" for angle in np.degrees(angles) + 0.0)
 
 
 def notes(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:

@@ -7,8 +7,7 @@ import sys
 from typing import Any
 
 from uam_lab.flights.flight_settings import FlightSettings
-from uam_lab.records.results.completion import complete
-from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.outcome import Outcome, complete
 from uam_lab.records.results.result_folder import ResultFolder, versions, write_json
 
 

@@ -28,13 +28,7 @@ from uam_control.vehicle import (
     chain_of,
     load_description,
 )
-from uam_lab.flights import (
-    arm_on_ground,
-    clearance,
-    node_options,
-    plant_fit,
-    vehicle_changes,
-)
+from uam_lab.flights import clearance, node_options, plant_fit
 from uam_lab.flights.flight_options import (
     AUTOPILOT_IMU,
     BUILTIN,
@@ -177,7 +171,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         raise SettingsError(str(error)) from None
     scenario_options = ScenarioOptions(o.end, o.transit_speed, o.transit_acceleration)
     vehicle = load_description(str(o.vehicle))
-    changes = vehicle_changes.checked(o.vehicle_changes, vehicle.numbers)
+    changes = node_options.checked_changes(o.vehicle_changes, vehicle.numbers)
     source = str(configuration.named("scenarios", str(o.scenario)))
     scenario = load_scenario(source, vehicle, scenario_options)
     profile, own = _profile(o, vehicle, namespace)
@@ -199,7 +193,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         scenario = feasible.fitted(scenario)
         feasible.check(scenario)
         about = feasible.note(scenario)
-    arm_on_ground.check(vehicle, scenario, o.plant)
+    clearance.check_standing(vehicle, scenario, o.plant)
     effects = presets.read(o.plant_preset, o.effects)
     made = FlightSettings(
         **{name: getattr(o, name) for name in AS_GIVEN},

@@ -15,8 +15,7 @@ from std_srvs.srv import Trigger
 
 from uam_control.supervision import PreflightCheck
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import ChecklistItem, read_items
-from uam_msgs_py.messages.preflight import read_preflight
+from uam_msgs_py.messages.checklist import ChecklistItem, read_items, read_preflight
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.polling import listen
@@ -82,7 +81,7 @@ class Operator:
     def command(self, name: str) -> tuple[bool, str]:
         """Call a Trigger service of the mission; return whether it was accepted, and the answer.
 
-        name: start, or one of `mission_services.COMMANDS`. Raises NoFlight.
+        name: start, or one of `mission_inputs.COMMANDS`. Raises NoFlight.
         """
         return self._call(f"mission/{name}")
 

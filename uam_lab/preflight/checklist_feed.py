@@ -19,19 +19,21 @@ from uam_lab.preflight.checklist.observation import (
     BAD,
     GOOD,
     WARNING,
+    GyroIntegral,
     NodeReport,
     Observation,
     PreArmLine,
     Resting,
+    Sample,
     Stream,
+    Window,
 )
-from uam_lab.preflight.checklist.samples import GyroIntegral, Sample, Window
 from uam_lab.preflight.checklist.step import Situation
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import read_preflight
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
-from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.status import OK, WARN, AutopilotState, RadioState, finite
 from uam_msgs_py.node.door import Door

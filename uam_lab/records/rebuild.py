@@ -12,11 +12,10 @@ from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.records.recording import log_facts
 from uam_lab.records.recording.log_reader import read_flight
-from uam_lab.records.recording.logged_topics import Log
-from uam_lab.records.recording.node_statistics import LABORATORY_FILE, latencies
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import write_text
-from uam_lab.records.results.completion import complete
+from uam_lab.records.results.outcome import complete
 from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError
 
 LOG, TABLE = "log.mcap", "timeseries.parquet"

@@ -33,7 +33,7 @@ from uam_lab.records.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
-from uam_msgs_py.node import connections, process_options
+from uam_msgs_py.node import process_options, wiring
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, REFUSED, StopSignal, begin, refuse
 from uam_msgs_py.node.health import LoopTime, ages
@@ -100,7 +100,7 @@ def _health(
     values["recorded until [s]"] = recording.until / SECOND
     namespace = node.get_namespace()
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
-    values |= connections.of(node, {}, recording.inlets)
+    values |= wiring.connection_counts(node, {}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     values |= recording.door.values()
     level = ERROR if recording.ended else WARN if lost else OK

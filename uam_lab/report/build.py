@@ -5,7 +5,7 @@
 | stability | `stability_of` | stability.json |
 | figures | `figures.draw` | figures/*.png, *.svg |
 | pictures | `flight_video.Rendering` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
-| page | `flight_page.write_page` | report.html |
+| page | `pages.write_page` | report.html |
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from uam_lab.records.results.result_folder import PX4_LOG, write_json
 from uam_lab.report.facts import px4_log
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import flight_page
+from uam_lab.report.page import pages
 from uam_lab.report.video.flight_video import Rendering
 
 
@@ -61,7 +61,7 @@ def build_report(
         figures.draw([flight], directory / "figures", progress)
         rendered = rendering.result(progress) if rendering else None
     progress("page")
-    written = flight_page.write_page(directory, rendered)
+    written = pages.write_page(directory, rendered)
     problems = filter(None, (rendered.problem if rendered else "", without))
     return Report(written, "; ".join(problems))
 

@@ -19,13 +19,13 @@ from uam_control.coordinates import (
     arm_coordinates,
     coordinates,
 )
-from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.serialized import Serialized
-from uam_msgs_py.messages.trajectories import (
+from uam_msgs_py.messages.convert import (
     CommandWriter,
     TrajectoryReader,
     TrajectoryWriter,
 )
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import Serialized
 
 POSE_NAMES = list(BASE_COORDINATES)
 ATTITUDE_NAMES = list(BASE_COORDINATES[ATTITUDE])

@@ -1,4 +1,4 @@
-"""tf2_msgs/msg/TFMessage, for installations without the package tf2_msgs.
+"""Poses of frames ↔ serialized tf2_msgs/msg/TFMessage, also without the package tf2_msgs.
 
 RViz and Foxglove require /tf. Its type is part of ROS's apt packages, but not of the wheels on
 PyPI. TFMessage is a sequence of TransformStamped. Its C type support is assembled from
@@ -10,10 +10,23 @@ The C structures are those of ROS 2 Jazzy, whose binary interface is frozen.
 """
 
 import ctypes
+import struct
+from collections.abc import Sequence
 from ctypes import POINTER, c_char_p, c_size_t, c_uint8, c_uint64, c_void_p
+from dataclasses import dataclass
 
+import numpy as np
 from geometry_msgs.msg import TransformStamped
 from visualization_msgs.msg import MarkerArray
+
+from uam_control.stamps import SECOND
+from uam_msgs_py.messages.layouts import (
+    ENCAPSULATION,
+    BadMessage,
+    Cursor,
+    is_little_endian,
+    stamp_of,
+)
 
 PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
 DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
@@ -21,6 +34,8 @@ DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
 FASTRTPS, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"
 NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: unbounded sequence of messages
+LITTLE_ENDIAN = b"\0\1\0\0"  # the encapsulation of plain CDR
+NUMBERS = 7  # translation x y z, rotation x y z w
 
 
 def _structure(**fields: type) -> type[ctypes.Structure]:
@@ -180,3 +195,53 @@ class TFMessage(metaclass=_Metaclass):
 
 
 TFMessage.__module__ = f"{PACKAGE}.msg"
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Pose of frame `child` in frame `parent` at `stamp` [ns].
+
+    position (3,) [m]; quaternion (4,) [w x y z], child → parent.
+    """
+
+    stamp: int
+    parent: str
+    child: str
+    position: np.ndarray
+    quaternion: np.ndarray
+
+
+def transforms_message(transforms: Sequence[Transform]) -> bytes:
+    """Return the serialized TFMessage of `transforms`."""
+    data = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
+    for transform in transforms:
+        _align(data, 4)
+        data += struct.pack("<iI", *divmod(transform.stamp, SECOND))
+        for name in (transform.parent, transform.child):
+            _align(data, 4)
+            text = name.encode() + b"\0"
+            data += struct.pack("<I", len(text)) + text
+        _align(data, 8)
+        w, x, y, z = transform.quaternion
+        data += struct.pack(f"<{NUMBERS}d", *transform.position, x, y, z, w)
+    return bytes(data)
+
+
+def read_transforms(data: bytes) -> list[Transform]:
+    """Return the transforms of a serialized TFMessage; raises BadMessage for other data."""
+    if not is_little_endian(data):
+        raise BadMessage("transforms in the byte order of another machine")
+    cursor = Cursor(data)
+    return [_transform(cursor) for _ in range(cursor.count())]
+
+
+def _transform(cursor: Cursor) -> Transform:
+    stamp = stamp_of(cursor.data, cursor.stamp())
+    parent, child = cursor.string(), cursor.string()
+    numbers = np.frombuffer(cursor.data[cursor.forward(8 * NUMBERS, align=8)], "<f8")
+    return Transform(stamp, parent, child, numbers[:3], np.roll(numbers[3:], 1))
+
+
+def _align(data: bytearray, size: int) -> None:
+    """Pad to a multiple of `size`, counted from the end of the encapsulation."""
+    data += bytes(-(len(data) - ENCAPSULATION) % size)

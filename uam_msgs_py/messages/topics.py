@@ -239,10 +239,10 @@ JOY = Topic("joy", Joy, SENSOR_DATA, "", "-1..1, 0 or 1", "of the gamepad", "joy
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic("uam/parameter_changes", DiagnosticArray, _qos(1000, latched=True), "", TEXT,
     ON_CHANGE, "every tunable node", readers="cockpit, uam fly", one_publisher=False,
-    about="see uam_msgs_py.messages.parameter_changes.ParameterChange")
+    about="see uam_msgs_py.messages.flight_events.ParameterChange")
 FAULTS = Topic("uam/faults", DiagnosticArray, _qos(1000, latched=True), "", TEXT, ON_CHANGE,
     "mujoco_sim, mavlink_bridge, uam fly", readers="cockpit", one_publisher=False,
-    about="faults put into the flight; see uam_msgs_py.messages.fault_events.FaultEvent")
+    about="faults put into the flight; see uam_msgs_py.messages.flight_events.FaultEvent")
 RESTARTS = Topic("uam/restarts", DiagnosticArray, _qos(100, latched=True), "", TEXT, ON_CHANGE,
     "uam fly", readers="mujoco_sim, cockpit",
     about="nodes that uam fly starts again after a loss; name: the node")

@@ -24,16 +24,15 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import connections, log_callers, polling, process_options
+from uam_msgs_py.node import log_callers, polling, process_options, wiring
 from uam_msgs_py.node.door import LOG_PERIOD
 from uam_msgs_py.node.executor import spin
-from uam_msgs_py.node.garbage import GarbageCollection
-from uam_msgs_py.node.health import LoopTime, ages
+from uam_msgs_py.node.health import LoopTime, StampWatch, ages
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import adopt_sections, expanded, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_msgs_py.node.process_options import GarbageCollection
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
-from uam_msgs_py.node.stamp_watch import StampWatch
 from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
 
@@ -237,7 +236,7 @@ class UamNode(TunableNode):
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)
-        common |= connections.of(self, self.outlets, self.inlets)
+        common |= wiring.connection_counts(self, self.outlets, self.inlets)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(diagnostic(stamp, label(self), level, summary, common | values))
 

@@ -26,8 +26,7 @@ from uam_control.settings.texts import visible
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
-from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, publishers
-from uam_msgs_py.node.taking import Taker
+from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, Taker, complaints, publishers
 
 LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
 NAMES_PERIOD = 0.1  # s of wall time between two looks at who publishes a topic

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from uam_control.settings.texts import visible
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import adopt_sections
 from uam_msgs_py.node.node_parameters import NodeParameters

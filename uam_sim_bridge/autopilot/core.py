@@ -22,11 +22,11 @@ from uam_control.offboard.modes import (
     MavResult,
     Mode,
 )
-from uam_control.setpoints.desired import Target
 from uam_control.setpoints.targets import (
     ATTITUDE_AND_YAW_RATE,
     RATES,
     PositionTarget,
+    Target,
     WrenchTarget,
 )
 from uam_control.vehicle import load_description
@@ -50,10 +50,8 @@ from uam_sim_bridge.autopilot.cycle import (
     take_vision,
 )
 from uam_sim_bridge.autopilot.landing import LandDetector
-from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
-from uam_sim_bridge.autopilot.loops.descent import Descent
-from uam_sim_bridge.autopilot.loops.position_control import PositionControl
-from uam_sim_bridge.autopilot.loops.position_modes import MODES, PositionModes
+from uam_sim_bridge.autopilot.loops.attitude_control import Descent, attitude_gains, attitude_rates
+from uam_sim_bridge.autopilot.loops.position_modes import MODES, PositionControl, PositionModes
 from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
     TORQUE,

@@ -21,10 +21,8 @@ from uam_control.maths.memory import Flag, Number, record
 from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavResult, Severity
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
-from uam_control.setpoints.desired import Target
 from uam_control.setpoints.targets import RATES as RATES_ALONE
-from uam_control.setpoints.targets import AttitudeTarget
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import AttitudeTarget, Target, VisionPose
 from uam_control.stages.autopilot_port import PortSteps
 from uam_control.stages.step import DECIDE, DONE
 from uam_sim_bridge.autopilot.commander import take_setpoint

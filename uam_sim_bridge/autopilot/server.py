@@ -14,6 +14,13 @@ simulator's even spacing, and stay within WITHIN of the own clock: a simulator t
 stop the autopilot's clock, which the companion would take for a reboot.
 
 `SerialLine` replaces both the simulator's socket and the companion's UDP port in `Server`.
+
+examples:
+  autopilot                         instance 0: simulator 4560, UDP 14580 -> 14540
+  autopilot --instance 3            every port + 3
+  autopilot --params my_frame.yaml  NAME: value lines, PX4's names
+  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line
+  autopilot --companion /dev/ttyUSB0:921600  TELEM2 on this line, simulator over TCP
 """
 
 from __future__ import annotations
@@ -38,11 +45,10 @@ from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.hil.hil_messages import CONTROLS
-from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicle, fill_ports
-from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
+from uam_sim_bridge.mavlink.hil.sitl_ports import Program, UdpPort, connect, fill_ports
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
-from uam_sim_bridge.mavlink.transport.serial_transport import SerialTransport
+from uam_sim_bridge.mavlink.transport.stream_transport import SerialTransport
 from uam_sim_bridge.mavlink.transport.transport import open_transport
 
 WITHIN = 0.02  # [s] between the time of a sample and the own clock
@@ -218,51 +224,22 @@ class Server:
             self._autopilot.set_sample_rate(1e6 / float(np.median(self._intervals)))
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Program:
     """Return the parser of the command line."""
-    p = argparse.ArgumentParser(
-        prog="autopilot",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="PX4-class autopilot stand-in: TCP client of a simulator, MAVLink 2 over UDP,\n"
-        "on the ports of PX4 SITL. All its time is the simulator's.",
-        epilog="examples:\n"
-        "  autopilot                         instance 0: simulator 4560, UDP 14580 -> 14540\n"
-        "  autopilot --instance 3            every port + 3\n"
-        "  autopilot --params my_frame.yaml  NAME: value lines, PX4's names\n"
-        "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n"
-        "  autopilot --companion /dev/ttyUSB0:921600  TELEM2 on this line, simulator over TCP\n",
+    p = Program(__doc__)
+    p.ports()
+    p.vehicle()
+    p.option("--params", "FILE", "parameters that override the vehicle's")
+    p.option("--serial", "DEVICE:BAUD", "use this line instead of TCP and UDP, as in HITL")
+    text = "use this line in place of UDP, as TELEM2, and an own clock; the simulator stays on TCP"
+    p.option("--companion", "DEVICE:BAUD", text)
+    p.switch("--once", "end with the simulator (default: wait for the next one)")
+    text = (
+        "run ahead of ordinary processes, as hardware of its own does, where the system permits it"
     )
-    add_port_options(p)
-    add_vehicle(p)
-    p.add_argument("--params", metavar="FILE", help="parameters that override the vehicle's")
-    p.add_argument(
-        "--serial",
-        metavar="DEVICE:BAUD",
-        help="use this line instead of TCP and UDP, as in HITL",
-    )
-    p.add_argument(
-        "--companion",
-        metavar="DEVICE:BAUD",
-        help="use this line instead of UDP, as TELEM2, and a clock of its own; the simulator stays "
-        "on TCP",
-    )
-    p.add_argument(
-        "--once",
-        action="store_true",
-        help="end with the simulator (default: wait for the next one)",
-    )
-    p.add_argument(
-        "--prefer",
-        action="store_true",
-        help="run ahead of ordinary processes, as hardware of its own does; ignored where the "
-        "system does not permit it",
-    )
-    p.add_argument(
-        "--signing-key",
-        default="",
-        metavar="KEY",
-        help="sign messages on UDP and refuse unsigned ones: 64 hex digits, or a file of them",
-    )
+    p.switch("--prefer", text)
+    text = "sign messages on UDP and refuse unsigned ones: 64 hex digits, or a file of them"
+    p.option("--signing-key", "KEY", text, "")
     return p
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_sim_bridge.devices.serial.pseudo_terminal import PseudoTerminal
+from uam_sim_bridge.devices.serial.serial_cable import PseudoTerminal
 from uam_sim_bridge.mavlink.hil.hil_messages import HilMessages
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Message, mavlink2
 

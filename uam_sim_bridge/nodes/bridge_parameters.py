@@ -29,7 +29,7 @@ from uam_control.settings.process_parameters import (
 )
 from uam_control.settings.texts import unknown
 from uam_control.stages.vision_pacing import VisionParameters
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import SwitchingParameters
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE
 
 AUTO, NONE = "auto", "none"  # values of required_parameters

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.fault_events import FaultEvent
+from uam_msgs_py.messages.flight_events import FaultEvent
 from uam_sim_bridge.faults.timeline import FaultState
 
 

@@ -42,9 +42,9 @@ from uam_sim_bridge.faults import CABLE, Schedule
 from uam_sim_bridge.laboratory.cables import Cables
 from uam_sim_bridge.laboratory.laboratory import Laboratory
 from uam_sim_bridge.laboratory.person import Person
-from uam_sim_bridge.nodes import laboratory_options
+from uam_sim_bridge.nodes import plant_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
+from uam_sim_bridge.nodes.plant_options import TOPIC, LaboratoryParameters
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
@@ -129,7 +129,7 @@ class Rehearsal:
         folder.mkdir(parents=True, exist_ok=True)
         self.lab = Laboratory(
             numbers,
-            laboratory_options.devices(vehicle, p),
+            plant_options.devices(vehicle, p),
             p.hil_port,
             p.payload_mass,
             p.seed,
@@ -276,7 +276,7 @@ def main() -> int:
         return REFUSED
     rehearsal = None
     try:
-        vehicle, parameters = laboratory_options.declare(node)
+        vehicle, parameters = plant_options.declare_laboratory(node)
         refuse_unknown(node)
         try:
             rehearsal = Rehearsal(node, vehicle, parameters, stop)

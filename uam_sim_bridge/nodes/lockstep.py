@@ -15,12 +15,12 @@ from collections.abc import Callable, Collection
 from uam_control.stamps import SECOND
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import StopSignal
-from uam_msgs_py.node.connections import Connections
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.tunable import TunableNode
+from uam_msgs_py.node.wiring import Connections
 from uam_sim_bridge.nodes.plant_options import PlantParameters
 from uam_sim_bridge.nodes.plant_topics import SETPOINT, Answers, RecorderProgress, suspected
-from uam_sim_bridge.patience import Patience
+from uam_sim_bridge.paced_clock import Patience
 
 REPORTS = 10  # of each node; a tick needs one round of each of six nodes
 SAY_AFTER = 3.0  # [s] of wall time until a wait is told

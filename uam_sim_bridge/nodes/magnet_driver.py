@@ -10,8 +10,13 @@ import time
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_sim_bridge.devices.magnet.lines import LineParameters, MagnetError, open_line
-from uam_sim_bridge.devices.magnet.magnet_driver import MagnetDriver, SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import (
+    LineParameters,
+    MagnetDriver,
+    MagnetError,
+    SwitchingParameters,
+    open_line,
+)
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 

@@ -8,7 +8,7 @@ from std_msgs.msg import Bool
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node.base_node import UamNode
-from uam_sim_bridge.devices.magnet.magnet_driver import MagnetSwitching, SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import MagnetSwitching, SwitchingParameters
 
 STATE_PERIOD = 1.0  # [s] between two messages of an unchanged state
 

@@ -27,13 +27,12 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.pose_source import PoseSource
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence
-from uam_control.setpoints.desired import Desired
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import Setpoint, sent
 from uam_control.setpoints.setpoint_types import SETPOINTS, SetpointParameters
+from uam_control.setpoints.targets import Desired, VisionPose
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
-from uam_control.setpoints.vision_pose import VisionPose
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.flight_measurements import FlightMeasurements, Sent
@@ -60,16 +59,15 @@ from uam_msgs_py.node.tick_times import DECODE, STAGE
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
-from uam_sim_bridge.nodes.autopilot_imu_topic import (
+from uam_sim_bridge.nodes.autopilot_topics import (
     WAKE_UP as IMU_WAKE_UP,
 )
-from uam_sim_bridge.nodes.autopilot_imu_topic import (
+from uam_sim_bridge.nodes.autopilot_topics import (
     AutopilotImuTopic,
+    AutopilotTopics,
     CompanionClock,
 )
-from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
-from uam_sim_bridge.nodes.bridge_link import open_links
-from uam_sim_bridge.nodes.bridge_magnet import bridge_magnet
+from uam_sim_bridge.nodes.bridge_link import bridge_magnet, open_links
 from uam_sim_bridge.nodes.bridge_parameters import BridgeParameters
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 

@@ -7,11 +7,11 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
           It also waits for a recorder that is far behind, so that no message is lost.
           It says whom it waits for. By hand a wait has a limit in wall time; in `uam fly` none:
-          it ends when no answer can come any more (`awaited.py`).
+          it ends when no answer can come any more (`lockstep.py`).
           With the autopilot's IMU (`publish_imu: false`) the autopilot gets its sample first, and
           passes it on. Ticks before the first setpoint run at the pace of the wall clock.
           While a lost node is restarted, ticks run at the pace of the wall clock without its
-          answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
+          answers, until all answers have been in time for IN_TIME ticks.
 realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
           stall of the machine they run a quarter faster (`paced_clock.py`). Without an answer by
           the next deadline the last command holds. The latency of a tick is the time from the
@@ -42,11 +42,11 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
-from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
+from uam_msgs_py.node.wiring import Connections, connection_counts
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
@@ -62,8 +62,7 @@ from uam_sim_bridge.nodes.plant_topics import (
     TruthTopics,
     nanoseconds,
 )
-from uam_sim_bridge.paced_clock import PacedClock
-from uam_sim_bridge.patience import Patience
+from uam_sim_bridge.paced_clock import PacedClock, Patience
 from uam_sim_bridge.plant import PhysicsError, Plant, Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
@@ -220,7 +219,7 @@ class Simulator:
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
             outlets = self.sensors.outlets | self.truth.outlets
-            plant = of(self.node, outlets, self.answers.inlets)
+            plant = connection_counts(self.node, outlets, self.answers.inlets)
             waiting = list(
                 wiring.unconnected(
                     self.connections,

@@ -28,6 +28,7 @@ from uam_msgs_py.messages.convert import (
     ImuWriter,
     JointStateWriter,
     PoseWriter,
+    TrajectoryWriter,
     read_joint_command,
     read_switch,
 )
@@ -35,7 +36,6 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.navigation import OdometryWriter
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.tick_times import NoTickTimes

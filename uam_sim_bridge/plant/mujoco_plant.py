@@ -16,12 +16,18 @@ from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.gripper import Fingers
-from uam_sim_bridge.plant.magnet import NO_MAGNET, magnet_constants
-from uam_sim_bridge.plant.observation import Observed, write_truth
-from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
+from uam_sim_bridge.plant.magnet import NO_MAGNET, PayloadHinge, add_to, magnet_constants
+from uam_sim_bridge.plant.observation import (
+    REAL,
+    WHOLE,
+    Observed,
+    PlantArrays,
+    sense,
+    step,
+    write_truth,
+)
 from uam_sim_bridge.plant.physics import PhysicsArrays
 from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
-from uam_sim_bridge.plant.plant_tick import REAL, WHOLE, PlantArrays, sense, step
 from uam_sim_bridge.plant.sensors import (
     BLOCK,
     PAYLOAD_POSE,
@@ -277,7 +283,7 @@ class MujocoPlant(Plant):
 
     @property
     def compiled(self) -> bool:
-        """Whether `sense` and `step` of `plant_tick` are all that a tick does."""
+        """Whether `sense` and `step` of `observation` are all that a tick does."""
         hinge = self._hinge
         free = hinge is None or (self._swing_rate is None and not hinge.closed)
         return self.effects.compiled and free

@@ -7,6 +7,10 @@ It needs a build without lockstep (`make px4_sitl_nolockstep`): PX4's clock is t
 flight controller. PX4's start scripts for the simulator and for MAVLink are replaced: sensors,
 commander and outputs start in HITL mode. Outputs 1 to N are the motors; 11 to 16 are the six of
 MAV_CMD_DO_SET_ACTUATOR.
+
+examples:
+  px4_hitl --px4-dir build/px4_sitl_nolockstep --companion /dev/pts/3:921600
+  px4_hitl --companion /dev/pts/3:921600 --usb /dev/pts/5   sensors on another line
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
+from uam_sim_bridge.mavlink.hil.sitl_ports import Program
 from uam_sim_bridge.mavlink.transport.transport import parse_url
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.process import How, Px4Process, add_px4_options, command
@@ -89,29 +93,15 @@ def mavlink_script(companion: str, baud: int, usb: str = "") -> str:
     return "\n".join(["#!/bin/sh", *lines, ""])
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Program:
     """Return the parser of the command line."""
-    p = argparse.ArgumentParser(
-        prog=NAME,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Run PX4 as a flight controller in HITL on serial lines, until interrupted.\n"
-        "The build has no lockstep: make px4_sitl_nolockstep.",
-        epilog="examples:\n"
-        "  px4_hitl --px4-dir build/px4_sitl_nolockstep --companion /dev/pts/3:921600\n"
-        "  px4_hitl --companion /dev/pts/3:921600 --usb /dev/pts/5   sensors on another line\n",
-    )
-    add_instance(p)
-    p.add_argument(
-        "--companion", required=True, metavar="DEVICE:BAUD", help="the companion's line, as TELEM2"
-    )
-    p.add_argument(
-        "--usb",
-        default="",
-        metavar="DEVICE",
-        help="line of the simulated sensors and motors (default: the companion's)",
-    )
+    p = Program(__doc__)
+    p.instance()
+    p.option("--companion", "DEVICE:BAUD", "the companion's line, as TELEM2", required=True)
+    text = "line of the simulated sensors and motors (default: the companion's)"
+    p.option("--usb", "DEVICE", text, "")
     add_px4_options(p, f"PX4 build without lockstep (default: ${LOOP_VARIABLE})")
-    add_vehicle(p)
+    p.vehicle()
     return p
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError
+from uam_sim_bridge.mavlink.hil.sitl_ports import Program
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.px4_installation import Px4Error, Px4Installation
@@ -192,28 +193,15 @@ def command(
     return ended(program, status)
 
 
-def add_px4_options(p: argparse.ArgumentParser, required: str) -> None:
+def add_px4_options(p: Program, required: str) -> None:
     """Add the options of every program that runs a PX4: build, parameters, log.
 
     required: what --px4-dir must be.
     """
-    p.add_argument("--px4-dir", metavar="DIR", help=required)
-    p.add_argument(
-        "--params",
-        metavar="FILE",
-        nargs="+",
-        help=f"parameters beside the vehicle's (default: {parameters.SIMULATION} of config/)",
-    )
-    p.add_argument(
-        "--param",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="a parameter of PX4, in place of the files' (repeatable)",
-    )
-    p.add_argument(
-        "--log",
-        type=Path,
-        metavar="FILE",
-        help=f"save PX4's log as FILE{LOG_SUFFIX} (default: the log is deleted)",
-    )
+    p.option("--px4-dir", "DIR", required)
+    text = f"parameters beside the vehicle's (default: {parameters.SIMULATION} of config/)"
+    p.option("--params", "FILE", text, nargs="+")
+    text = "a parameter of PX4, in place of the files' (repeatable)"
+    p.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help=text)
+    text = f"save PX4's log as FILE{LOG_SUFFIX} (default: the log is deleted)"
+    p.option("--log", "FILE", text, type=Path)

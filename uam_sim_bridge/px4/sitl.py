@@ -4,7 +4,13 @@ It runs in a new directory, so that no parameter of an earlier flight remains. I
 its instance (TCP 4560 + N of the simulator, UDP 14580 + N) and the parameters of config/. PX4's log
 (ULog) is saved on request, also if PX4 ends early. PX4's clock is the simulator's: PX4 waits for
 each HIL_SENSOR. PX4 never connects again after the simulator has hung up: this program then starts
-it anew for the next simulator.
+it anew for the next simulator, until it is interrupted.
+
+examples:
+  px4_sitl --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
+  px4_sitl --instance 2 --log flight.ulg
+  px4_sitl --params mine.yaml       NAME: value lines, PX4's names
+  px4_sitl --param COM_OF_LOSS_T=1.0 --param SDLOG_MODE=0
 """
 
 from __future__ import annotations
@@ -18,8 +24,7 @@ from functools import partial
 import psutil
 
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
-from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
+from uam_sim_bridge.mavlink.hil.sitl_ports import HOST, Program
 from uam_sim_bridge.ports import SIMULATOR_TCP
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.process import How, Px4Process, add_px4_options, command
@@ -60,30 +65,14 @@ def _connected(pid: int, port: int) -> bool:
     )
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Program:
     """Return the parser of the command line."""
-    p = argparse.ArgumentParser(
-        prog=NAME,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Run PX4 SITL with this vehicle's parameters, in a fresh directory, until it\n"
-        "is interrupted. It waits for a simulator at TCP 4560 + N: mujoco_sim.",
-        epilog="examples:\n"
-        "  px4_sitl --px4-dir ~/PX4-Autopilot/build/px4_sitl_default\n"
-        "  px4_sitl --instance 2 --log flight.ulg\n"
-        "  px4_sitl --params mine.yaml       NAME: value lines, PX4's names\n"
-        "  px4_sitl --param COM_OF_LOSS_T=1.0 --param SDLOG_MODE=0\n",
-    )
-    add_instance(p)
+    p = Program(__doc__)
+    p.instance()
     add_px4_options(p, REQUIRED)
-    add_vehicle(p)
-    p.add_argument(
-        "--sim-host", default=HOST, metavar="HOST", help="simulator (default %(default)s)"
-    )
-    p.add_argument(
-        "--once",
-        action="store_true",
-        help="serve one simulator (default: start PX4 anew for the next one)",
-    )
+    p.vehicle()
+    p.option("--sim-host", "HOST", "simulator", HOST)
+    p.switch("--once", "serve one simulator (default: start PX4 anew for the next one)")
     return p
 
 

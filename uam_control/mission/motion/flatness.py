@@ -9,12 +9,29 @@ drag"; here the drag acts along the world axes.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, JERK, PITCH, ROLL, SNAP, YAW, X, Y, Z
+from uam_control.arm.chain import Chain
+from uam_control.coordinates import (
+    ATTITUDE,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    JERK,
+    PITCH,
+    POSITION,
+    ROLL,
+    SNAP,
+    YAW,
+    X,
+    Y,
+    Z,
+)
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import thrust_attitude
+from uam_control.vehicle import VehicleDescription, VehicleError, chain_and_hinge
 
 
 @jit
@@ -115,3 +132,41 @@ def write_angle(
     rows[CHI_DDOT] = (a_ddot * b - a * b_ddot) / square - turn * 2.0 * (a * a_dot + b * b_dot) / (
         square * square
     )
+
+
+class Flyer(NamedTuple):
+    """gravity [m/s^2]; drag (3,): linear, per mass, along the world axes [1/s]; hinge: lowest and
+    highest angle [rad] of the one that the hand hangs on."""
+
+    chain: Chain
+    gravity: float
+    drag: np.ndarray
+    hinge: tuple[float, float] = (-math.inf, math.inf)
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription) -> Flyer:
+        """Return that of a vehicle. Raises VehicleError, also for one without an end effector."""
+        chain, hinge = chain_and_hinge(vehicle)
+        if not chain.has_hand:
+            raise VehicleError(f"{vehicle.file}: the vehicle has no end effector")
+        drag = np.array(vehicle.numbers["air"]["drag"]) / vehicle.mass
+        return cls(chain, vehicle.gravity, drag, hinge)
+
+    @classmethod
+    def with_hand(cls, vehicle: VehicleDescription) -> Flyer | None:
+        """Return that of a vehicle, None for one without an end effector."""
+        try:
+            return cls.of(vehicle)
+        except VehicleError:
+            return None
+
+
+def flattened(rows: np.ndarray, flyer: Flyer) -> np.ndarray:
+    """Write the attitude that the acceleration of rows (3, m, 6 + n) needs into their angles.
+
+    Return the force (m, 3) of the rotors per mass [m/s^2].
+    """
+    force = rows[CHI_DDOT, :, POSITION] + flyer.drag * rows[CHI_DOT, :, POSITION]
+    force[:, Z] += flyer.gravity
+    rows[CHI, :, ATTITUDE] = attitudes(force, rows[CHI, :, YAW])
+    return force

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DOT, JERK, SNAP
-from uam_control.mission.motion.polynomials import hermite
-from uam_control.mission.motion.quintics import quintic, quintic_at
+from uam_control.mission.motion.polynomials import hermite, quintic, quintic_at
 
 
 class Segment:

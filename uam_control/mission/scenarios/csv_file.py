@@ -25,9 +25,13 @@ from uam_control.coordinates import YAW, Z, arm_coordinates
 from uam_control.grasp import grasp_windows
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.environment import usual_load
-from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
-from uam_control.mission.scenarios.open_gaps import worst_swing
-from uam_control.mission.scenarios.rests import between_rests
+from uam_control.mission.scenarios.fitted_spline import (
+    CurveSamples,
+    Misfit,
+    between_rests,
+    fitted,
+    worst_swing,
+)
 from uam_control.mission.scenarios.route import Route
 from uam_control.mission.scenarios.scenario import (
     LONGEST_FILE,

@@ -1,19 +1,25 @@
 """Smooth interpolation of samples: a spline of degree 7, with six continuous derivatives.
 
+Rows alone say moves between rests; gaps may be so long that they say too little.
+
 The spline is the least-squares fit to values and, where they are given, rates and accelerations.
 The knots lie close enough that it passes every value within a tolerance. A planner's file has
 rounded numbers, and rates and accelerations that belong only approximately to its positions; an
 interpolation through all of them (quintic Hermite) has jumps in the jerk. This one has none.
+
+The fit is least in snap; over a gap much longer than those beside it such a curve swings out. A
+gap is checked against the box of its two rows and of the way that their rates point to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.motion.trajectory import Move
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -30,6 +36,9 @@ RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 5e-9
 END, END_PIECES = 3e-7, 2  # [s^6] of the sixth derivative in so many intervals at either end
 DENSE = 1.5  # rows per interval, from which on
 LEAST_ACCELERATION = 1e-6  # [s^2] of acceleration itself: decides where under four samples do not
+PLACES = 32  # at which a gap is checked
+OUTSIDE, OF_DISTANCE = 0.2, 0.5  # [m or rad] and of the distance of the rows: the rest is a swing
+SLOW = 1e-3  # [m/s], [rad/s] below which a coordinate rests
 
 
 class Misfit(ValueError):
@@ -178,3 +187,62 @@ def _polynomials(spline: BSpline) -> Polynomials:
         rows = _basis(knots[:-1], spline.t, order) @ spline.c
         powers.append(rows * width**order / scale)
     return Polynomials(knots, np.array(powers).swapaxes(0, 1))
+
+
+class Swing(NamedTuple):
+    """The curve between row and row + 1 leaves them in a column by distance [m or rad]."""
+
+    row: int
+    column: int
+    distance: float
+
+
+def worst_swing(times: np.ndarray, samples: CurveSamples, curve: Polynomials) -> Swing | None:
+    """Return the swing that exceeds its bound most, None if no gap has one.
+
+    times (m,) [s] of the samples; curve: their fit.
+    """
+    gaps = np.flatnonzero(np.diff(times) > COARSEST)
+    if not len(gaps):
+        return None
+    values, width = samples.values, np.diff(times)[gaps, None]
+    rates = _slopes(times, values) if samples.rates is None else samples.rates
+    first, last = values[gaps], values[gaps + 1]
+    # control points of the cubic through values and rates: it lies within their box
+    corners = (first, last, first + rates[gaps] * width / 3, last - rates[gaps + 1] * width / 3)
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    share = np.linspace(0.0, 1.0, PLACES)
+    places = times[gaps, None] + width * share
+    flown = curve.rows(places.ravel(), 1)[0].reshape(len(gaps), PLACES, -1)
+    beyond = np.maximum(flown - high[:, None], low[:, None] - flown).max(axis=1)
+    allowed = OUTSIDE + OF_DISTANCE * np.linalg.norm(last - first, axis=1)
+    gap, column = np.unravel_index(np.argmax(beyond - allowed[:, None]), beyond.shape)
+    if beyond[gap, column] <= allowed[gap]:
+        return None
+    return Swing(int(gaps[gap]), int(column), float(beyond[gap, column]))
+
+
+def _slopes(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the rates (m, n) by the rows beside each row."""
+    beside = np.arange(len(times))
+    before, after = np.maximum(beside - 1, 0), np.minimum(beside + 1, len(times) - 1)
+    return (values[after] - values[before]) / (times[after] - times[before])[:, None]
+
+
+def between_rests(times: np.ndarray, values: Mapping[str, np.ndarray]) -> tuple[Move, ...]:
+    """Return the moves of coordinates between rests and turns.
+
+    times (m,) [s]; values: coordinate -> samples (m,) [m or rad]. The height has a move that ends
+    at the first sample: the way there.
+    """
+    found = [Move("z", float(times[0]) - 1.0, float(times[0]), float(values["z"][0]))]
+    for name, samples in values.items():
+        rates = np.diff(samples) / np.diff(times)
+        ways = np.where(np.abs(rates) > SLOW, np.sign(rates), 0.0)
+        edges = np.flatnonzero(np.diff(ways, prepend=0.0, append=0.0))
+        for first, last in zip(edges, edges[1:], strict=False):
+            if ways[first]:
+                found.append(
+                    Move(name, float(times[first]), float(times[last]), float(samples[last]))
+                )
+    return tuple(found)

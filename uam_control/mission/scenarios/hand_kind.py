@@ -9,8 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.arm.hand import ELEVATION, HEADING, freedom, hands, jacobians, reach, stretch
-from uam_control.arm.posture import working_posture
+from uam_control.arm.hand import (
+    ELEVATION,
+    HEADING,
+    freedom,
+    hands,
+    jacobians,
+    reach,
+    stretch,
+    working_posture,
+)
 from uam_control.coordinates import (
     ALPHA,
     ARM,
@@ -21,7 +29,7 @@ from uam_control.coordinates import (
     arm_coordinates,
     coordinates,
 )
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 from uam_control.mission.scenarios.hand_motion import (

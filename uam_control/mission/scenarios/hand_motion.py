@@ -27,7 +27,7 @@ from uam_control.coordinates import (
     YAW,
 )
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.motion.flyer import Flyer, flattened
+from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, fitted
 

@@ -27,12 +27,12 @@ from uam_lab.experiments.design.gains import (
     Bandwidths,
     autopilot_gains,
     estimator,
+    rate_loop,
     sections,
     thrust_response,
 )
-from uam_lab.experiments.design.rate_loop import rate_loop
+from uam_lab.experiments.margins.linear import Margins
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, analyse, fastest_mode
-from uam_lab.experiments.margins.margins import Margins
 from uam_lab.experiments.margins.report import Case
 from uam_lab.experiments.margins.stack_model import Stack, stack_model
 from uam_sim_bridge.plant import Vehicle

@@ -20,8 +20,15 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ARM, POSITION
-from uam_lab.experiments.margins.linear import IN, LinearBlock, join
-from uam_lab.experiments.margins.margins import TINY, Margins, common_delay, margins
+from uam_lab.experiments.margins.linear import (
+    IN,
+    TINY,
+    LinearBlock,
+    Margins,
+    common_delay,
+    join,
+    margins,
+)
 from uam_lab.experiments.margins.stack_model import RATES, THRUST, Stack, hand_signals
 
 LOWEST, FREQUENCIES = 0.05, 1200  # [rad/s] and number, up to half the tick rate

@@ -1,4 +1,6 @@
-"""What a trial needs of this machine's files, for a worker that does not share the file system.
+"""What trials depend on, and what a worker needs that does not share the file system.
+
+A resumed campaign must have the same inputs, by name.
 
 Names in config/ need nothing: every worker has the same configuration (`workers.identity`). A
 scenario that is a file travels as it was read, a model of the user as its files.
@@ -7,18 +9,21 @@ scenario that is a file travels as it was read, a model of the user as its files
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleDescription
+from uam_lab.experiments.workers.identity import identity
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # of MuJoCo's element `compiler`
 
@@ -108,3 +113,35 @@ def _unpacked(files: tuple[tuple[str, bytes], ...]) -> Path:
             target.write_bytes(content)
         _folders[name] = made
     return Path(_folders[name].name)
+
+
+def inputs(
+    vehicle: VehicleDescription, scenario: str, further: Mapping[str, object]
+) -> dict[str, str]:
+    """Return name → digest of all inputs of flights of this vehicle and scenario (name or file).
+
+    further: options, profiles and others, which differ by their repr.
+    """
+    laws = [Path(inspect.getsourcefile(law)) for law in LAWS.values()]
+    named = {
+        **further,
+        "vehicle": vehicle.numbers,
+        "autopilot gains": vehicle.autopilot_gains,
+        "model (MJCF and its files)": _content(
+            file for model in vehicle.models for file in files_of_model(model)
+        ),
+        "scenario": _content([configuration.named("scenarios", scenario)]),
+        "laws": _content(laws),
+        **identity(),
+    }
+    return {name: _short(value) for name, value in named.items()}
+
+
+def _short(value: object) -> str:
+    if isinstance(value, str) and len(value) <= 16:
+        return value
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:12]
+
+
+def _content(files: Iterable[Path]) -> list[tuple[str, str]]:
+    return [(file.name, hashlib.sha256(file.read_bytes()).hexdigest()) for file in files]

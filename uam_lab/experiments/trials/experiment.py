@@ -15,12 +15,11 @@ from typing import Any
 
 from uam_lab.experiments.trials.carried import arrived, carried
 from uam_lab.experiments.trials.counting import Counting
-from uam_lab.experiments.trials.rows import Rows
+from uam_lab.experiments.trials.rows import Rows, RowTable
 from uam_lab.experiments.trials.trial import Trial, measure
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
 from uam_lab.flights.direct.warm_up import prepare
-from uam_lab.records.results import row_table
 from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.terminal import say
 
@@ -54,7 +53,7 @@ class Experiment:
         Returns key → result of all `keys`, in their order. Raises RowTableError if the table has
         flights with other inputs.
         """
-        table = row_table.RowTable(self.table, self.rows.schema, self.inputs)
+        table = RowTable(self.table, self.rows.schema, self.inputs)
 
         def there(key: Any) -> bool:
             return key in table.keys and ((keep := trial(key).keep) is None or keep.exists())

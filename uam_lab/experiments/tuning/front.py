@@ -1,7 +1,8 @@
 """Two objectives: the cost of the flights, as small as possible, and the delay margin, as large.
 
 The front contains the candidates that no other one surpasses in both. Its hypervolume is the area
-that it dominates, from REFERENCE on; the search has converged when it stops growing.
+that it dominates, from REFERENCE on. A search has converged when its last evaluations improved the
+result, the least cost or this area, by less than a share.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from uam_sim_bridge.plant import Vehicle
 PAYLOADS = (0.0, 0.2)  # [kg] on the magnet, of which the smaller margin counts
 # corner of the area: the logarithm of the cost 10, and no margin [s]
 WORST_COST, NO_MARGIN = 10.0, 0.0
+SMALL = 0.01  # share of the result
+LEAST = 20  # evaluations without improvement from which on a search may be called converged
 
 
 def delay_margin(profile: Profile) -> float:
@@ -63,3 +66,24 @@ def chosen(trials: Sequence[FrozenTrial], at_least: float) -> FrozenTrial:
     if enough:
         return min(enough, key=lambda one: one.values[0])
     return max(trials, key=lambda one: one.values[1])
+
+
+def improvement(curve: Sequence[float], patience: int) -> float:
+    """Return by which share the last `patience` evaluations improved the result.
+
+    curve: best cost, or area under the front, after each evaluation. infinity while there are not
+    more evaluations than that, for a patience below 1, or if the result before was zero.
+    """
+    if patience < 1 or len(curve) <= patience or curve[-1 - patience] == 0.0:
+        return math.inf
+    before = curve[-1 - patience]
+    return abs(curve[-1] - before) / abs(before)
+
+
+def convergence(curve: Sequence[float], patience: int) -> str:
+    """Return one line: whether the search has converged, and why."""
+    share = improvement(curve, patience)
+    if math.isinf(share):
+        return f"not converged: {len(curve)} evaluations, of which the last {patience} would count"
+    state = "converged" if share < SMALL else "not converged"
+    return f"{state}: the last {patience} of {len(curve)} evaluations improved it by {share:.2%}"

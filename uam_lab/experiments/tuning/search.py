@@ -20,10 +20,9 @@ from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
-from uam_lab.experiments.trials.inputs import inputs
+from uam_lab.experiments.trials.carried import inputs
 from uam_lab.experiments.trials.trial import measure
-from uam_lab.experiments.tuning.convergence import SMALL, improvement
-from uam_lab.experiments.tuning.front import delay_margin, hypervolumes
+from uam_lab.experiments.tuning.front import SMALL, delay_margin, hypervolumes, improvement
 from uam_lab.experiments.tuning.space import Space, TuningError
 from uam_lab.experiments.workers.identity import difference
 from uam_lab.experiments.workers.place import Workplace

@@ -36,7 +36,7 @@ from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
 from uam_sim_bridge.plant import PhysicsError, Plant
 from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
-from uam_sim_bridge.plant.plant_tick import sense, step
+from uam_sim_bridge.plant.observation import sense, step
 from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, MocapArrays
 
 COMPILES = "compiling the direct engine for this law and vehicle (once)"

@@ -25,8 +25,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.faults import Schedule
-from uam_sim_bridge.faults.direct import DirectFaults
-from uam_sim_bridge.faults.faulty_plant import make_plant
+from uam_sim_bridge.faults.faulty_plant import DirectFaults, make_plant
 from uam_sim_bridge.nodes.bridge_parameters import check_names
 from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay

@@ -12,9 +12,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from uam_control.arm.dynamics import gravity_torque, mass_matrix
 from uam_control.arm.hand import hands
-from uam_control.arm.kinematics import ORIGIN
+from uam_control.arm.kinematics import ORIGIN, gravity_torque, mass_matrix
 from uam_control.coordinates import ALPHA
 from uam_control.grasp.kinematics import hand_and_levers
 from uam_control.grasp.sight import RunningMean
@@ -25,7 +24,7 @@ from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.profiles.profile import default_profile
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import VisionPose
 from uam_control.stages.bridge_stage import sending
 from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.law_stages import arm_step, attitude_step, position_step

@@ -26,14 +26,12 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from setproctitle import setproctitle
-
-from uam_lab.flights.processes.borrowed_environment import borrowed
 
 GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
 TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
@@ -45,6 +43,33 @@ SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA
 
 _context = multiprocessing.get_context("forkserver")
 _preparation_data = multiprocessing.spawn.get_preparation_data
+_lock = threading.RLock()
+
+
+def copied() -> dict[str, str]:
+    """Return a copy of the variables, without the changes of `borrowed` in other threads."""
+    with _lock:
+        return dict(os.environ)
+
+
+@contextlib.contextmanager
+def borrowed(environment: Mapping[str, str]) -> Iterator[None]:
+    """Set these variables within the `with` block, in one thread at a time.
+
+    Several flights of one program run in threads. ROS and the numerical libraries read some
+    variables when they start.
+    """
+    with _lock:
+        before = {name: os.environ.get(name) for name in environment}
+        os.environ.update(environment)
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
 
 
 def _without_main(name: str) -> dict[str, Any]:

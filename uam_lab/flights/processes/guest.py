@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.flights.processes.borrowed_environment import borrowed
+from uam_lab.flights.processes.child import borrowed
 
 SECURITY = "ROS_SECURITY_ENABLE"
 SOURCE = re.compile(r",? at /\S+:\d+|^failed to initialize rcl: ")  # of rcl's text, for its authors

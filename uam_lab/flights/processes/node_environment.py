@@ -9,8 +9,7 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_lab.flights.processes import thread_stop
-from uam_lab.flights.processes.borrowed_environment import copied
-from uam_lab.flights.processes.child import SINGLE_THREAD
+from uam_lab.flights.processes.child import SINGLE_THREAD, copied
 from uam_lab.flights.processes.middleware import middleware
 
 PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"

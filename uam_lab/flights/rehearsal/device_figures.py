@@ -11,8 +11,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE, statistics
 from uam_lab.records.recording.mcap_reader import UnreadableLog, read_log
-from uam_lab.records.recording.node_statistics import LABORATORY_FILE, statistics
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized

@@ -22,7 +22,7 @@ from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import NodeFailed, Processes
-from uam_lab.flights.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.laboratory_process import (
     LABORATORY,
     LABORATORY_MODULE,
@@ -30,16 +30,15 @@ from uam_lab.flights.rehearsal.laboratory_process import (
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import logged
-from uam_lab.flights.ros.status_listener import StatusListener
+from uam_lab.flights.ros.supervise import StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import settings_of
-from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
-from uam_lab.flights.vehicle.vehicle_engine import start_nodes
+from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse, start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
-from uam_lab.records.recording.logged_topics import Log
-from uam_lab.records.recording.node_statistics import (
+from uam_lab.records.recording.logged_topics import (
     LABORATORY_FILE,
+    Log,
     latencies,
     statistics,
 )
@@ -106,8 +105,10 @@ class RehearsalEngine:
             each.mkdir(exist_ok=True)
         with Reservation(None, own_autopilot=False) as reservation:
             ports = reservation.ports
-            document = emulated_lab.emulated(self._lab, devices, device_figures.free_udp_port())
-            lab = emulated_lab.write(document, self._lab.file, folder.path)
+            document = laboratory_process.emulated_lab(
+                self._lab, devices, device_figures.free_udp_port()
+            )
+            lab = laboratory_process.write_lab(document, self._lab.file, folder.path)
             own = settings_of(lab, settings.command)
             settings = replace(settings, link=own.link, autopilot=own.autopilot)
             modules = vehicle_nodes.processes(lab)

@@ -1,4 +1,6 @@
-"""Parameters of the laboratory's process, and arguments of the autopilot's.
+"""Parameters of the laboratory's process, arguments of the autopilot's, the rehearsed lab file.
+
+That file is the given one, with the names of its devices replaced.
 
 The autopilot is the stand-in, or a PX4 in HITL with both of its lines as pseudo-terminals.
 """
@@ -16,13 +18,16 @@ from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.flight_settings import FlightSettings
-from uam_lab.flights.rehearsal.emulated_lab import MAGNET_LINE, baud_of
 from uam_lab.flights.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
-from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.records.recording.node_statistics import LABORATORY_FILE
+from uam_lab.flights.vehicle.lab import GPIO, Lab, LabError
+from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE
+from uam_lab.records.results.atomic import write_text
+from uam_sim_bridge.devices.mocap.calibration import FOLDER as CALIBRATIONS
 from uam_sim_bridge.faults import CABLE
-from uam_sim_bridge.laboratory.laboratory import SERIAL_FAR, USB
-from uam_sim_bridge.nodes.laboratory_options import LINE, NATNET, TCP, TOPIC
+from uam_sim_bridge.laboratory.laboratory import BUS_DEVICE, SERIAL_FAR, SERIAL_NEAR, USB
+from uam_sim_bridge.mavlink.transport.transport import parse_url
+from uam_sim_bridge.nodes.plant_options import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.ports import Ports
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.hitl import gripper_parameter
@@ -33,6 +38,11 @@ PX4 = "uam_sim_bridge.px4.hitl"
 PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them
 REQUIRED, IN_THE_LOOP = "px4/vehicle.yaml", "px4_parameters.yaml"  # in config/, in the logs
 GRIPPER_ON, GRIPPER_OFF = 1.0, -1.0  # outputs of a closed and an open gripper
+HOST = "127.0.0.1"
+MAGNET_LINE = "magnet"  # file of the simulated line, in the folder of the devices
+SIMULATED = "simulated:"
+NAME = "lab.yaml"
+BAUD = 921600  # of the line, where the lab file has another kind of link
 
 
 def parameters(
@@ -131,3 +141,56 @@ def required_parameters(px4: Px4Installation | None, logs: Path) -> dict[str, An
     file = logs / IN_THE_LOOP
     file.write_text(yaml.safe_dump(sections, sort_keys=False), encoding="utf-8")
     return {"required_parameters": str(file.absolute())}
+
+
+def baud_of(lab: Lab) -> int:
+    """Return the baud rate of the autopilot's line."""
+    link = parse_url(lab.autopilot)
+    return link.number if link.kind == "serial" else BAUD
+
+
+def emulated_lab(lab: Lab, devices: Path, mocap_port: int) -> dict[str, Any]:
+    """Return the content of the rehearsed lab file.
+
+    devices: folder of the pseudo-terminals; mocap_port: command port of the emulated server.
+    Raises LabError where a device cannot be emulated.
+    """
+    document = dict(yaml_file.read(lab.file, LabError))
+    arm = document["arm"]
+    if isinstance(arm, str):
+        arm = yaml_file.read(lab.arm_file, LabError)["arm"]
+    document |= {  # names of files are relative to the lab file: write them in full
+        "vehicle": lab.vehicle.source,
+        "profile": list(lab.profile),
+        "scenario": lab.scenario,
+        "arm": {**arm, "device": str(devices / BUS_DEVICE)},
+        "autopilot": f"serial:{devices / SERIAL_NEAR}:{baud_of(lab)}",
+        "autopilot_system": 1,
+    }
+    if not lab.profile:
+        del document["profile"]
+    if lab.mocap is not None:
+        if lab.mocap.source != NATNET:
+            raise LabError(
+                f"{lab.file}: mocap: source: {lab.mocap.source}: only {NATNET} can be rehearsed"
+            )
+        found = configuration.named(CALIBRATIONS, lab.mocap.calibration)
+        document["mocap"] = {
+            **document["mocap"],
+            "server": HOST,
+            "local": "",
+            "command_port": mocap_port,
+            "calibration": str(found.absolute()),
+        }
+    if lab.magnet.through == GPIO:
+        line = f"{SIMULATED}{devices / MAGNET_LINE}"
+        document["magnet"] = {**document["magnet"], "chip": line}
+    return document
+
+
+def write_lab(document: dict[str, Any], given: Path, folder: Path) -> Lab:
+    """Write the rehearsed lab file into `folder` and read it; given: the file it is made of."""
+    file = folder / NAME
+    head = f"# Rehearsal of {given}: the same file with the names of emulated devices.\n"
+    write_text(file, head + yaml.safe_dump(document, sort_keys=False, allow_unicode=True))
+    return load_lab(file)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.processes.processes import NodeFailed
 from uam_lab.records.recording.log_reader import read_flight
+from uam_lab.records.recording.logged_topics import RECORDER, losses, statistics
 from uam_lab.records.recording.mcap_reader import UnreadableLog
-from uam_lab.records.recording.node_statistics import RECORDER, losses, statistics
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 

@@ -10,8 +10,7 @@ from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnetParameter
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.page_address import LOCAL, PORT
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain
-from uam_sim_bridge.devices.magnet.lines import LineParameters
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import LineParameters, SwitchingParameters
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 
 AUTOPILOT, TOPIC, GPIO = "autopilot", "topic", "gpio"

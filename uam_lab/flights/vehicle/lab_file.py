@@ -37,8 +37,7 @@ from uam_lab.flights.vehicle.lab import (
 )
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, chain_file, load_chain
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.magnet.lines import LineParameters
-from uam_sim_bridge.devices.magnet.magnet_driver import SwitchingParameters
+from uam_sim_bridge.devices.magnet.lines import LineParameters, SwitchingParameters
 from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.devices.mocap.frame import MocapError
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters

@@ -1,31 +1,41 @@
 """The engine of a flight on a vehicle: the nodes of a laboratory on the wall clock, no simulator.
 
 ROS domain → parameter file → processes → devices → flight → stop in order → log → table
+
+The flight goes on until the mission has ended. A first request to stop in the air becomes the
+command land; a second one ends the nodes at once, and the autopilot's own failsafe acts.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Iterator
+import time
+from collections.abc import Callable, Collection, Iterator
 
 from uam_control.profiles.profile import CONTROLLERS
+from uam_control.supervision import State
 from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import COCKPIT
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
+from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import Processes
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import read_outcome
-from uam_lab.flights.ros.status_listener import StatusListener
+from uam_lab.flights.ros.supervise import StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
+from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.flights.vehicle.vehicle_course import VehicleCourse
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
+from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
+from uam_msgs_py.node.namespace import prefix
+from uam_msgs_py.node.polling import listen
+from uam_msgs_py.node.wiring import Connections
 from uam_sim_bridge.ports import Ports, Reservation
 
 LAB_COPY = "lab.yaml"
@@ -36,6 +46,111 @@ AGAIN = (
 )  # nodes that are restarted after a loss
 OPTIONAL = (COCKPIT, wiring.RECORDER)  # a vehicle in the air must not lose its control for a log
 NOTHING_FLOWN = "nothing was flown: the mission had no state of the estimator; the log is kept"
+LINGER = 4.0  # [s] after the mission, in which the autopilot disarms and closes its log
+LOOK_PERIOD = 0.5  # [s] between two looks at the devices
+REPEAT = 10.0  # [s] between two lines about nodes that are not connected
+CONTROLLED = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
+NONE_CONNECTED: dict[str, int] = {}  # of the plant, which a vehicle has not
+
+
+class VehicleCourse:
+    """A `Course`; a context manager."""
+
+    def __init__(
+        self,
+        lab: Lab,
+        listener: StatusListener,
+        guest: Callable[[str], Guest],
+        observer: Observer,
+        stop: StopRequest,
+    ) -> None:
+        """guest: returns a further node in the flight's ROS domain, by its name."""
+        self._lab, self._listener, self._guest = lab, listener, guest
+        self._observer, self._stop = observer, stop
+        node = listener.node
+        self._diagnostics = listen(node, topics.DIAGNOSTICS)
+        self._connections = Connections(node, spun=False)
+        self._prefix = prefix(node.get_namespace())
+        self._reports: dict[str, Report] = {}
+        self._devices, self._wires = devices(lab), vehicle_nodes.wires(lab)
+        self._look_at = self._said_at = 0.0  # [s] time.monotonic()
+        self._connected = self._landing = False
+        self._done_at: float | None = None
+
+    def __enter__(self) -> VehicleCourse:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        """Nothing is open."""
+
+    def goes_on(self) -> bool:
+        """Look at devices and nodes; return whether the flight goes on."""
+        now = time.monotonic()
+        self._look(now)
+        newest = self._listener.newest[-1] if self._listener.newest else None
+        if newest is not None and newest.done and self._done_at is None:
+            self._done_at = now
+        if self._done_at is not None:
+            return now - self._done_at < LINGER and not self._stop.impatient
+        if not self._stop.raised:
+            return True
+        in_the_air = newest is not None and newest.state in [one.value for one in CONTROLLED]
+        if self._stop.impatient or not in_the_air:
+            return False
+        self._land()
+        return True
+
+    def _look(self, now: float) -> None:
+        """Take the diagnostics; every LOOK_PERIOD report the devices."""
+        for message in self._listener.door.messages(self._diagnostics):
+            self._connections.note(message)
+            for status in message.status:
+                name = status.name.removeprefix(self._prefix)
+                values = {pair.key: pair.value for pair in status.values}
+                self._reports[name] = Report(status.level, status.message, values)
+        if now >= self._look_at:
+            self._look_at = now + LOOK_PERIOD
+            self._observer.bring_up([one.state(self._reports) for one in self._devices])
+            self._look_at_connections(now)
+
+    def _look_at_connections(self, now: float) -> None:
+        """Report once that all nodes are connected, and now and then which are not."""
+        if self._connected:
+            return
+        node = self._listener.node
+        waiting = wiring.missing(node, True, self._wires) or list(
+            wiring.unconnected(
+                self._connections,
+                NONE_CONNECTED,
+                True,
+                self._wires,
+                (),
+                node.get_namespace(),
+                wiring.publishers(node),
+            )
+        )
+        if not waiting:
+            self._connected = True
+            self._observer.message("all nodes are connected")
+        elif self._said_at == 0.0:
+            self._said_at = now + REPEAT
+        elif now >= self._said_at:
+            self._said_at = now + REPEAT
+            more = f" and {len(waiting) - 1} more" if len(waiting) > 1 else ""
+            self._observer.message(f"waiting for {waiting[0]}{more}")
+
+    def _land(self) -> None:
+        """Send the command land, once."""
+        if self._landing:
+            return
+        self._landing = True
+        self._observer.message("in the air: command land; once more: ends the nodes at once")
+        try:
+            with self._guest("uam_landing") as guest:
+                _, answer = Operator(guest.node).command("land")
+        except NoFlight as error:
+            answer = str(error)
+        self._observer.message(f"land: {answer}")
 
 
 class VehicleEngine:

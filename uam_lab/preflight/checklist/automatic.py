@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from uam_lab.preflight.checklist.finding import UNKNOWN, Finding, at_least, at_most
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import BAD, Box, Observation
+from uam_lab.preflight.checklist.step import UNKNOWN, Finding, at_least, at_most
 
 ARM_DRIVER, RECORDER = "arm_driver", "recorder"
 KILL_SWITCH = "RC_MAP_KILL_SW"  # PX4: channel of the kill switch

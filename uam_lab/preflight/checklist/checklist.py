@@ -13,9 +13,8 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.limits import ChecklistParameters
-from uam_lab.preflight.checklist.step import Situation, Step, StepState
+from uam_lab.preflight.checklist.step import Finding, Situation, Step, StepState
 
 AUTOMATIC, GUIDED = "automatic", "guided"
 NOT_YET = "not judged yet"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.maths.rotations import matrix_from_quaternion
-from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.limits import MotionLimits
-from uam_lab.preflight.checklist.samples import Sample, rotation_vector, up
+from uam_lab.preflight.checklist.observation import Sample, rotation_vector, up
+from uam_lab.preflight.checklist.step import Finding
 
 AXES = ("roll", "pitch", "yaw")
 DIRECTIONS = ("forward", "left", "up")

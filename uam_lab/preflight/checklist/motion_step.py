@@ -14,11 +14,16 @@ from typing import Protocol
 
 import numpy as np
 
-from uam_lab.preflight.checklist.finding import Finding
 from uam_lab.preflight.checklist.limits import MotionLimits
 from uam_lab.preflight.checklist.motion_kinds import Pose
-from uam_lab.preflight.checklist.samples import Sample, Window, angle_between, rotation_vector, up
-from uam_lab.preflight.checklist.step import MOTION, Situation, Step, StepState
+from uam_lab.preflight.checklist.observation import (
+    Sample,
+    Window,
+    angle_between,
+    rotation_vector,
+    up,
+)
+from uam_lab.preflight.checklist.step import MOTION, Finding, Situation, Step, StepState
 
 STILL_THERE = 0.25  # share of the amplitude within which a pose is not left yet
 LEFT_BEHIND = 0.75  # share of the amplitude by which a kept pose is left before the next counts

@@ -9,16 +9,15 @@ from dataclasses import dataclass, field
 
 from uam_control.offboard.firmware import FIRMWARES, Firmware
 from uam_control.offboard.modes import MavCmd
-from uam_lab.preflight.doctor import vehicle_parameters
 from uam_lab.preflight.doctor.finding import Finding, fail, ok, warn
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import ParameterReader
+from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterReader, request
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
-PATIENCE = 5.0  # [s] for a heartbeat (sent once per second)
+PATIENCE = 5.0  # [s] for a heartbeat (sent once per second), and for one more parameter
 VERSION_PATIENCE = 2.0  # [s] for AUTOPILOT_VERSION after it
 BEAT, POLL = 0.5, 0.01  # [s]
 USUAL_SYSTEM = 1  # that the bridge speaks to, without autopilot_system
@@ -57,9 +56,7 @@ def px4(directory: str | None = None) -> Finding:
         )
 
 
-def link(
-    url: str, patience: float = PATIENCE, parameters: float = vehicle_parameters.PATIENCE
-) -> Iterator[Finding]:
+def link(url: str, patience: float = PATIENCE, parameters: float = PATIENCE) -> Iterator[Finding]:
     """Check for an autopilot at `url`, for at most `patience` [s], and yield the finding.
 
     If it is a PX4, yield one finding per parameter that a vehicle needs; parameters [s]: without a
@@ -80,8 +77,8 @@ def link(
         if spoken is not None:
             rules = RequiredParameters.read(VEHICLE, spoken)
             reader = ParameterReader(rules, as_bytes=spoken.integers_as_bytes)
-            values = vehicle_parameters.read(transport, _codec(), heard.system, reader, parameters)
-            yield from vehicle_parameters.findings(values, rules)
+            values = read_parameters(transport, _codec(), heard.system, reader, parameters)
+            yield from parameter_findings(values, rules)
     finally:
         transport.close()
 
@@ -192,3 +189,40 @@ def _request(system: int) -> Message:
     return mavlink2.MAVLink_command_long_message(
         system, component, MavCmd.REQUEST_MESSAGE, 0, version, *[0] * 6
     )
+
+
+def read_parameters(
+    transport: Transport,
+    codec: Codec,
+    system: int,
+    reader: ParameterReader,
+    patience: float,
+) -> dict[str, float]:
+    """Return the values that `reader` asks of the autopilot `system`, as far as it answers.
+
+    patience [s]: without a further answer.
+    """
+    framer = Framer(codec)
+    progress = time.monotonic()
+    while not reader.complete and (now := time.monotonic()) < progress + patience:
+        for name in reader.due(now):
+            transport.send(codec.encode(request(name, system)))
+        for data in transport.receive():
+            for message in framer.take(data, transport.stream):
+                of_system = message.get_srcSystem() == system
+                if of_system and message.get_type() == "PARAM_VALUE" and reader.take(message):
+                    progress = now
+        time.sleep(POLL)
+    return reader.values
+
+
+def parameter_findings(values: dict[str, float], rules: RequiredParameters) -> Iterator[Finding]:
+    """Yield one line per required parameter, as a table: name, value, required value."""
+    for name, rule in rules.items():
+        value = values.get(name)
+        text = "not answered" if value is None else f"{value:.9g}"
+        found = f"{text}, {rule.required} required on a vehicle"
+        if value is not None and rule.met(value):
+            yield ok(name, found)
+        else:
+            yield warn(name, found, rule.why)

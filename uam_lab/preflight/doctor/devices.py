@@ -12,7 +12,7 @@ from uam_lab.preflight.doctor.finding import Finding, fail, ok
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.mocap import live
+from uam_sim_bridge.devices.mocap import measurement
 from uam_sim_bridge.devices.mocap.frame import MocapError
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters, open_source
 from uam_sim_bridge.devices.servo_bus import BusLost
@@ -40,7 +40,7 @@ def _tried(name: str, advice: dict[str, str], look: Callable[[], str]) -> Findin
 def _mocap(parameters: MocapParameters) -> str:
     source = open_source(parameters)
     try:
-        live.until_known(source, parameters.body)
+        measurement.until_known(source, parameters.body)
         return f"'{parameters.body}' of {source.description}"
     finally:
         source.close()

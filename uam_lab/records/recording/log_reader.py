@@ -10,7 +10,7 @@ process did not send (`inner_rate`) are left out: their errors would contain the
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,14 +20,12 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
-from uam_control.mission.motion.flyer import Flyer
+from uam_control.mission.motion.flatness import Flyer
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.records.recording import fault_records as fault_log
-from uam_lab.records.recording.logged_topics import ADAPTATION, Log, StampedRows
+from uam_lab.records.recording.logged_topics import ADAPTATION, Log, StampedRows, latencies
 from uam_lab.records.recording.mcap_reader import UnreadableLog
-from uam_lab.records.recording.node_statistics import latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.outcome import Outcome, grasp_decision, transition
 from uam_lab.records.results.timeseries import (
@@ -37,9 +35,9 @@ from uam_lab.records.results.timeseries import (
     gain_columns,
 )
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.fault_events import FaultEvent
-from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.flight_events import FaultEvent, ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
+from uam_sim_bridge.faults.timeline import record
 
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
 STANDS = 0.01  # [1] motor command
@@ -157,7 +155,7 @@ def read_flight(
             name, len(recording.phase_names)
         )
     recording.count = len(ticks)
-    faults = fault_log.records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
+    faults = fault_records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
     outcome = Outcome(
         series=recording.series(info),
         wall_s=log.wall_seconds(states),
@@ -343,3 +341,18 @@ def phases(
             yield WAITING
         else:
             yield ended
+
+
+def fault_records(events: Iterable[tuple[int, FaultEvent]], takeoff: int) -> list[dict[str, Any]]:
+    """Return the faults of a log, see `timeline.record`.
+
+    events: with their stamps [ns]; takeoff: stamp [ns] of mission time 0.
+    """
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for stamp, event in events:
+        time, key = (stamp - takeoff) / SECOND, (event.place, event.number)
+        if event.active:
+            found[key] = record(event.name, time, None, event.parameters)
+        elif key in found:
+            found[key]["end_s"] = round(time, 6)
+    return sorted(found.values(), key=lambda entry: entry["begin_s"])

@@ -1,25 +1,27 @@
-"""The topics of a log as rows of numbers by stamp, and as messages."""
+"""The topics of a log as rows by stamp and as messages; latencies, losses, statistics."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.stamps import SECOND
-from uam_lab.records.recording import cdr
 from uam_lab.records.recording.mcap_reader import TopicLog, UnreadableLog, read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_switch
-from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.layouts import STAMP, BadMessage, Layout, Layouts
 from uam_msgs_py.messages.serialized import deserialized
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.namespace import expanded
+from uam_sim_bridge.nodes.latencies import DEADLINE_TICKS
 
 ADAPTATION = {
     "position": topics.POSITION_ADAPTATION,
@@ -33,6 +35,53 @@ TOPICS = (
     *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
     *(topics.SETPOINT, topics.THRUST, topics.PAYLOAD, *ADAPTATION.values()),
 )
+RECORDER = "recorder.json"
+LABORATORY_FILE = "laboratory.json"
+
+
+@dataclass
+class Block:
+    """Messages with one layout: stamps (m,) [ns], names, and each field as (m, n) float64.
+
+    order (m,): numbers of the messages within the topic; time_from_start: int64 [ns].
+    """
+
+    order: np.ndarray
+    stamps: np.ndarray
+    names: list[str]
+    fields: dict[str, np.ndarray]
+
+
+def read_blocks(type_name: str, messages: Sequence[bytes]) -> list[Block]:
+    """Decode all messages of one topic; return one block per layout.
+
+    Raises KeyError for a type without a layout, BadMessage for an invalid message.
+    """
+    layouts = Layouts(type_name)
+    groups: dict[int, tuple[Layout, list[int]]] = {}
+    for number, data in enumerate(messages):
+        layout = layouts.of(data)
+        groups.setdefault(id(layout), (layout, []))[1].append(number)
+    return [_block(layout, messages, np.array(numbers)) for layout, numbers in groups.values()]
+
+
+def _block(layout: Layout, messages: Sequence[bytes], numbers: np.ndarray) -> Block:
+    table = np.frombuffer(b"".join([messages[i] for i in numbers]), dtype=np.uint8)
+    table = table.reshape(len(numbers), -1)
+    fields = {
+        name: np.ascontiguousarray(table[:, where]).view("<f8")
+        for name, where in layout.fields.items()
+    }
+    if layout.duration is not None:
+        fields["time_from_start"] = _nanoseconds(table[:, layout.duration])
+    return Block(numbers, _nanoseconds(table[:, STAMP]), layout.names, fields)
+
+
+def _nanoseconds(table: np.ndarray) -> np.ndarray:
+    """Convert int32 seconds and uint32 nanoseconds, bytes (m, 8), to int64 (m,) [ns]."""
+    pairs = np.ascontiguousarray(table).view([("sec", "<i4"), ("nanosec", "<u4")])[:, 0]
+    return pairs["sec"].astype(np.int64) * 1_000_000_000 + pairs["nanosec"]
+
 
 T = TypeVar("T")
 
@@ -70,7 +119,7 @@ class Log:
             for topic in TOPICS
             if (name := expanded(namespace, topic.name)) in found
         }
-        self._blocks: dict[Topic, list[cdr.Block]] = {}
+        self._blocks: dict[Topic, list[Block]] = {}
 
     @classmethod
     def read(cls, path: Path) -> Log:
@@ -108,7 +157,7 @@ class Log:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         return np.concatenate([one.stamps for one in blocks]), np.array(log.published)
 
-    def blocks(self, topic: Topic) -> list[cdr.Block]:
+    def blocks(self, topic: Topic) -> list[Block]:
         """Return the decoded messages of a topic, decoded once; may be empty.
 
         Raises UnreadableLog.
@@ -117,7 +166,7 @@ class Log:
         if made is None:
             log = self._topics.get(topic)
             try:
-                made = cdr.read(log.type_name, log.messages) if log and log.messages else []
+                made = read_blocks(log.type_name, log.messages) if log and log.messages else []
             except BadMessage as error:
                 raise UnreadableLog(f"a message of {topic.name} is damaged: {error}") from None
             self._blocks[topic] = made
@@ -157,8 +206,44 @@ class Log:
         return found
 
 
-def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
+def _field(block: Block, field: str, width: int) -> np.ndarray:
     found = block.fields.get(field)
     if found is None:
         return np.zeros((len(block.stamps), width))
     return found[:, :width]
+
+
+def latencies(log: Log, period: float, ticks: np.ndarray | None = None) -> tuple[np.ndarray, int]:
+    """Return the times (m,) [s] from the IMU's samples to the sending of their setpoints.
+
+    And the number of missed ticks, sent later than DEADLINE_TICKS periods [s] or never. ticks (k,)
+    [ns]: those that count; None: those between the first and the last setpoint. A tick has the
+    stamp of its sample; stamps and wall times are those of the same computer.
+    """
+    stamps, sent = log.published(topics.SETPOINT)
+    if ticks is None:
+        ticks, _ = log.published(topics.STATE)
+        if len(stamps):
+            ticks = ticks[(ticks >= stamps.min()) & (ticks <= stamps.max())]
+    counts = np.isin(stamps, ticks)
+    latency = (sent - stamps)[counts] / SECOND
+    in_time = stamps[counts][latency <= DEADLINE_TICKS * period]
+    return latency, len(np.setdiff1d(ticks, in_time))
+
+
+def statistics(file: Path) -> dict[str, Any]:
+    """Return what a node wrote at its end, {} without it."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def losses(logs: Path) -> list[str]:
+    """Return a note about the messages that the recorder lost, in a list; [] if it lost none."""
+    lost = statistics(logs / RECORDER).get("lost")
+    if not lost:
+        return []
+    text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+    buffers = "uam doctor checks the receive buffers"
+    return [f"the recorder lost {sum(lost.values())} messages, {buffers}: {text}"]

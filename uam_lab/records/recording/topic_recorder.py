@@ -6,7 +6,7 @@ in the sequence numbers of one publisher.
 
 The subscriptions are polled and have no callbacks: the threads of the middleware collect the
 messages, and taking fifty messages in one poll costs a tenth of fifty callbacks. A poll takes some
-milliseconds, in which it offers its core to others, see `core_offers`.
+milliseconds, in which it offers its core to others, see `CoreOffers`.
 
 Log time is simulation time: the stamp in the header. For types without a header, and for
 /diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
@@ -19,6 +19,7 @@ keeps the frames, status names and loggers of its namespace.
 
 from __future__ import annotations
 
+import os
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
@@ -34,21 +35,21 @@ from rclpy.subscription import Subscription
 
 from uam_lab.records.recording.bag import BagTopic, add_topic, write_metadata
 from uam_lab.records.recording.bounded_log import BoundedLog
-from uam_lab.records.recording.core_offers import CoreOffers
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import deserialized, type_name
-from uam_msgs_py.messages.transforms import read_transforms, transforms_message
+from uam_msgs_py.messages.tf_message import read_transforms, transforms_message
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import expanded, prefix
 from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
-from uam_msgs_py.node.sole_publisher import UNKNOWN, publishers
-from uam_msgs_py.node.taking import Taker
+from uam_msgs_py.node.sole_publisher import UNKNOWN, Taker, publishers
 
 # a serialized message → the part to keep, None: nothing; raises BadMessage
 Filter = Callable[[bytes], bytes | None]
 DEPTH = 2000  # queue length per topic: 8 s at control rate
+AT_ONCE = 4  # messages between two offers
+LONG = 0.002  # [s] a tick's process computes for less than this
 
 
 def own_part(topic: topics.Topic, namespace: str) -> Filter | None:
@@ -113,6 +114,31 @@ def _reader(topic: topics.Topic) -> Callable[[bytes], object]:
     if topic in (topics.TF, topics.TF_STATIC):
         return read_transforms
     return lambda data: deserialized(data, topic.type)
+
+
+class CoreOffers:
+    """Call `begin` at the begin of a poll, then `after` each message.
+
+    A process that the flight waits for, and that becomes ready during a poll on the same core,
+    often waits for its end: Linux lets a running process finish its slice. One that gives up the
+    core waits for others in turn, on a busy computer for many milliseconds. So a poll offers
+    nothing more after a long wait.
+    """
+
+    def __init__(self) -> None:
+        self._offering = True
+
+    def begin(self) -> None:
+        """Begin a poll: offer again."""
+        self._offering = True
+
+    def after(self, number: int) -> None:
+        """Offer the core if `number` messages are a multiple of AT_ONCE."""
+        if number % AT_ONCE or not self._offering:
+            return
+        begun = time.perf_counter()
+        os.sched_yield()
+        self._offering = time.perf_counter() - begun < LONG
 
 
 class TopicRecorder:

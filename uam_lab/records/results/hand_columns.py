@@ -11,7 +11,7 @@ import numpy as np
 from uam_control.arm.hand import HEADING, hands
 from uam_control.coordinates import CHI
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.motion.flyer import Flyer, flattened
+from uam_control.mission.motion.flatness import Flyer, flattened
 
 GROUPS = TRUTH, REFERENCE, ERROR = "end_effector", "end_effector_reference", "end_effector_error"
 COORDINATES = {"x": "m", "y": "m", "z": "m", "heading": "rad", "elevation": "rad"}

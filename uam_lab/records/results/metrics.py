@@ -15,7 +15,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.grasp import Grasp
-from uam_lab.records.results import hand_errors, phase_errors
+from uam_lab.records.results import phase_errors
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 
 # (key, columns of the error block, factor from SI to the unit that the key names)
@@ -105,10 +105,10 @@ def compute(
         "payload_lifted_at_s": payload.lifted_at_s,
         "payload_lift_height_m": payload.lift_height_m,
         "payload_place_error_m": payload.place_error_m,
-        "load_steps": hand_errors.load_steps(series),
+        "load_steps": phase_errors.load_steps(series),
         "landing_error_m": landing,
-        "rms": errors(series, rms) | hand_errors.rms(series, series.flown),
-        "max": errors(series, largest) | hand_errors.largest(series, series.flown),
+        "rms": errors(series, rms) | phase_errors.rms(series, series.flown),
+        "max": errors(series, largest) | phase_errors.largest(series, series.flown),
         "position_3d_m": phase_errors.root_mean_square(phase_errors.distance(series, series.flown)),
         "phases": phases,
         "trajectory": next((p for p in phases if p["phase"] == phase_errors.TRAJECTORY), None),

@@ -1,13 +1,15 @@
-"""Result of a flight, the same for both engines."""
+"""Result of a flight, the same for both engines, and what completes its result folder."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from uam_control.grasp import GraspDecision
 from uam_control.supervision import State, StateTransition
+from uam_lab.records.results import metrics
+from uam_lab.records.results.result_folder import ResultFolder, write_json
 from uam_lab.records.results.timeseries import Series
 
 
@@ -78,3 +80,36 @@ class Outcome:
         if self.interrupted:
             return "interrupted by the user"
         return self.failure or self.abort_reason
+
+
+def complete(
+    folder: ResultFolder, known: Mapping[str, Any], outcome: Outcome
+) -> dict[str, Any] | None:
+    """Write metrics, table and facts of a flight; known: its settings, see `settings_facts`."""
+    if outcome.partial:
+        outcome.notes.insert(0, f"partial: the recording ends with the flight ({outcome.reason})")
+    info = {
+        **known,
+        "wall_s": outcome.wall_s,
+        "abort_reason": outcome.reason,
+        "partial": outcome.partial,
+        "notes": outcome.notes,
+        "missed_ticks": outcome.missed_ticks,
+        "parameter_changes": outcome.parameter_changes,
+        "transitions": outcome.transitions,
+        "grasps": outcome.grasps,
+        "faults": outcome.faults,
+    }
+    if outcome.errors_of:
+        info["errors_of"] = outcome.errors_of
+        text = f"errors are {outcome.errors_of} − reference: a vehicle has no simulator's truth"
+        if text not in outcome.notes:
+            outcome.notes.append(text)
+    write_json(folder.info, info)
+    if outcome.series is None:
+        return None
+    outcome.series.info.update(info)
+    outcome.series.write(folder.timeseries)
+    figures = metrics.compute(outcome.series, info, outcome.latency_s)
+    write_json(folder.metrics, figures)
+    return figures

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from uam_lab.records.results.timeseries import SUBSYSTEMS
@@ -11,21 +10,8 @@ from uam_lab.records.results.timeseries import SUBSYSTEMS
 LOOSE = 0.1  # V / bound; below it the page calls the bound loose
 
 
-@dataclass(frozen=True)
-class StabilityRow:
-    """One subsystem as text: V and its bound, error and its bound, K*, compensating terms."""
-
-    name: str
-    value: str
-    bound: str
-    error: str
-    error_bound: str
-    constants: str
-    supplied: str
-
-
-def rows(found: Mapping[str, Any]) -> list[StabilityRow]:
-    """Return one row per subsystem."""
+def rows(found: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return one row of texts per subsystem."""
     return [_row(name, found[name]) for name in SUBSYSTEMS]
 
 
@@ -70,22 +56,21 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _row(name: str, one: Mapping[str, Any]) -> StabilityRow:
+def _row(name: str, one: Mapping[str, Any]) -> dict[str, str]:
     value, shares = one["V"], one["coupling"]
     met = (("adaptive_share", "adaptive"), ("unknown_share", "adaptive of what is unknown"),
            ("feedback_share", "feedback"),
            ("integral_share", "integral action"), ("actuators_share", "actuators"))  # fmt: skip
-    return StabilityRow(
-        name=name,
-        value=_number(value["max"]),
-        bound=_number(max(value["start"], value["bound"])),
-        error=_number(one["xi_max"]),
-        error_bound=_number(one["xi_bound"]),
-        constants=", ".join(_number(k) for k in one["K_star"]),
-        supplied=", ".join(
-            f"{label} {_percent(shares[key], 0)}" for key, label in met if shares[key] is not None
-        ),
-    )
+    terms = [f"{text} {_percent(shares[key], 0)}" for key, text in met if shares[key] is not None]
+    return {
+        "name": name,
+        "value": _number(value["max"]),
+        "bound": _number(max(value["start"], value["bound"])),
+        "error": _number(one["xi_max"]),
+        "error_bound": _number(one["xi_bound"]),
+        "constants": ", ".join(_number(k) for k in one["K_star"]),
+        "supplied": ", ".join(terms),
+    }
 
 
 def _list(values: Mapping[str, float], form: str, factor: float = 1.0) -> str:

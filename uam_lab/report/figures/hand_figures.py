@@ -1,8 +1,9 @@
-"""The end effector: its path against its reference, and its error over time."""
+"""The end effector: path against reference, error over time, workspace."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,6 +18,8 @@ HEIGHT = 3.6  # [in]
 VIEWS = ("xy", "xz", "xyz")  # from above, from the side, in space
 MOST = 3000  # points of a path
 DEGREES = 180.0 / np.pi
+# from the left, from behind, from above
+SIDES = (("x", "z"), ("y", "z"), ("x", "y"))
 
 
 def hand_errors(flights: Sequence[DrawnFlight]) -> Figure | None:
@@ -64,3 +67,18 @@ def _shown(series: Series) -> np.ndarray:
     ramps = series.flown & np.any([series.in_phase(name) for name in WITH_RAMPS], axis=0)
     rows = np.flatnonzero(ramps if ramps.any() else series.flown)
     return rows[:: max(1, len(rows) // MOST)]
+
+
+def draw_workspace(file: Path, name: str, places: np.ndarray) -> None:
+    """Write the picture of the places (m, 3) [m], base frame, that it reaches, as PNG."""
+    with style.styled():
+        figure = Figure(figsize=(11.0, 4.0), layout="constrained")
+        for axes, (across, up) in zip(figure.subplots(1, 3), SIDES, strict=True):
+            shown = places[:, "xyz".index(across)], places[:, "xyz".index(up)]
+            axes.plot(*shown, ".", color=style.FLIGHTS[0], markersize=1)
+            axes.plot(0.0, 0.0, "+", color=style.INK)
+            axes.set_xlabel(f"{across} [m]")
+            axes.set_ylabel(f"{up} [m]")
+            axes.set_aspect("equal", adjustable="datalim")
+        figure.suptitle(f"{name}: reach of the end effector; +: origin of the base")
+        style.save(figure, file)

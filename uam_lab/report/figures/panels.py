@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from uam_lab.records.results.timeseries import ON_GROUND, Series
-from uam_lab.report.facts import change_rows
+from uam_lab.report.facts import parameter_table
 from uam_lab.report.figures import fault_marks, style
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
 
 def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
     """Mark each change of parameters by a thin line (dotted: refused) and its number."""
-    shown = [row for row in change_rows.rows(series.info) if start <= row.time <= end]
+    shown = [row for row in parameter_table.rows(series.info) if start <= row.time <= end]
     for accepted, colour, dashes, _ in CHANGES:
         times = [row.time for row in shown if row.accepted == accepted]
         for axis in axes.flat if times else ():
@@ -202,7 +202,7 @@ def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> 
                 zorder=2.4,
             )
     for axis in axes[0]:
-        for time, text in change_rows.labels(shown, apart=0.02 * (end - start)):
+        for time, text in parameter_table.labels(shown, apart=0.02 * (end - start)):
             style.note(axis, text, (time, 1.0), (2, -2), **CHANGE)
 
 
@@ -222,7 +222,7 @@ def legend(
     handles = flight_keys(flights)
     named = dict.fromkeys((name, colour) for _, colour, name in marked)
     handles += [style.key(name, colour, 0.9, MAGNET_DASHES) for name, colour in named]
-    results = {row.accepted for row in change_rows.rows(flights[0].series.info)}
+    results = {row.accepted for row in parameter_table.rows(flights[0].series.info)}
     handles += [
         style.key(name, colour, 0.8, dashes)
         for accepted, colour, dashes, name in CHANGES

@@ -151,7 +151,7 @@ def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> 
 
 
 def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> None:
-    from uam_lab.report.video import video
+    from uam_lab.report.video import flight_pictures
 
     folder = figures / SNAPSHOTS
     folder.mkdir(parents=True, exist_ok=True)
@@ -161,24 +161,26 @@ def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> 
     for number, (time, caption) in enumerate(snapshots):
         report(f"snapshot {number + 1} of {len(snapshots)}")
         pixels = scene.picture(series.row_at(time))
-        pictures.append(video.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
+        pictures.append(
+            flight_pictures.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART)
+        )
         with replacing(folder / f"{'abcdefghijklmnopqrstuvwxyz'[number % 26]}.png") as temporary:
             pictures[-1].save(temporary)
     scene.close()
     with replacing(figures / STRIP) as temporary:
-        video.strip(pictures).save(temporary)
+        flight_pictures.strip(pictures).save(temporary)
 
 
 def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:
-    from uam_lab.report.video import video
+    from uam_lab.report.video import flight_pictures
 
-    scene = _scene(series, video.SIZE)
+    scene = _scene(series, flight_pictures.SIZE)
 
     def show(done: int, of: int) -> None:
         if done % 10 == 0 or done == of:
             report(f"video {100 * done // of} %")
 
-    video.write(series, scene.picture, path, show)
+    flight_pictures.write(series, scene.picture, path, show)
     scene.close()
 
 

@@ -1,19 +1,31 @@
-"""Mean pose of a body that stands still, and the refusal of one that does not."""
+"""Mean pose of a body that stands still, and the refusal of one that does not.
+
+Its poses come from the running system, or from a recording: CSV, in the tracker's axes.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
+import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
+from uam_control.settings.csv_table import CsvTable
+from uam_control.stamps import SECOND
+from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError, MocapSource
 
 FEWEST = 60  # poses, half a second at 120 Hz
 # A tracker has some 0.4 mm and 0.1 deg of noise; a vehicle that is held by hand moves more.
 MOVED = 0.003  # [m]
 TURNED = math.radians(0.5)
+ANSWER_TIME = 5.0  # [s] for the system to answer
+COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")  # s, m
+SLOWEST = 0.5  # [s] between two poses; in ms or us they are farther apart
+ROOM = 50.0  # [m] in which a recording is; in mm it is larger
 
 
 class TimedPose(NamedTuple):
@@ -94,3 +106,74 @@ def _mean(poses: Sequence[TimedPose]) -> StillPose:
     angles = [angle_between(quaternion, one) for one in quaternions]
     wobble = math.sqrt(float(np.mean(np.square(angles))))
     return StillPose(position, quaternion, spread, wobble, len(poses))
+
+
+def until_known(source: MocapSource, body: str) -> None:
+    """Wait until the system knows the body; raise MocapError with the bodies that there are."""
+    deadline = time.monotonic() + ANSWER_TIME
+    while time.monotonic() < deadline:
+        source.frames(0.05)
+        if source.names is not None and body in source.names:
+            return
+    if source.names is None:
+        raise MocapError(f"no answer of {source.description}; is it on, and does it stream?")
+    there = ", ".join(sorted(source.names)) or "none"
+    raise MocapError(f"no rigid body '{body}' in {source.description}; there are: {there}")
+
+
+def tracked_poses(source: MocapSource, body: str, duration: float) -> list[TimedPose]:
+    """Return the tracked poses of the next `duration` [s]; raise MocapError if there are none."""
+    while source.frames(0.0):  # those that arrived before
+        pass
+    found: list[TimedPose] = []
+    frames, deadline = 0, time.monotonic() + duration
+    while time.monotonic() < deadline:
+        for frame in source.frames(0.05):
+            frames += 1
+            pose = frame.bodies.get(body)
+            if pose is not None and not (found and frame.arrival / SECOND <= found[-1].time):
+                found.append(TimedPose(frame.arrival / SECOND, pose))
+    if not frames:
+        raise MocapError(f"no frames from {source.description}; is it paused?")
+    if not found:
+        raise MocapError(f"body '{body}' is not tracked: markers hidden or out of sight")
+    return found
+
+
+def write_poses(file: Path, poses: Sequence[TimedPose]) -> None:
+    """Write the poses; raises OSError."""
+    with file.open("w", newline="", encoding="utf-8") as out:
+        rows = csv.writer(out)
+        rows.writerow(COLUMNS)
+        for time, (position, quaternion) in poses:
+            numbers = *position, *quaternion
+            rows.writerow([f"{time:.6f}", *(f"{number:.9g}" for number in numbers)])
+
+
+def read_poses(file: Path) -> list[TimedPose]:
+    """Read the poses; raises MocapError with the line, also for other units than s and m."""
+    table = CsvTable(file, MocapError)
+    missing = [name for name in COLUMNS if name not in table.header]
+    if missing:
+        needed = f"no column {', '.join(missing)}; needed: {','.join(COLUMNS)}"
+        raise table.error(table.header_line, needed)
+    found: list[TimedPose] = []
+    for line, numbers in zip(table.lines, table.numbers(COLUMNS), strict=True):
+        quaternion = np.array(numbers[4:])
+        norm = math.sqrt(quaternion @ quaternion)
+        if not 0.9 < norm < 1.1:
+            raise table.error(line, f"not a pose: the quaternion's norm is {norm:.3g}")
+        if found and numbers[0] <= found[-1].time:
+            raise table.error(line, "t does not grow")
+        pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
+        if found and (far := max(abs(pose.position - found[0].pose.position))) > ROOM:
+            apart = f"{far:g} m from the first pose, at most {ROOM:g} m allowed"
+            raise table.error(line, f"{apart}; give x, y, z in metres")
+        found.append(TimedPose(numbers[0], pose))
+    apart = float(np.median(np.diff([one.time for one in found]))) if len(found) > 1 else 0.0
+    if apart > SLOWEST:
+        raise MocapError(
+            f"{file}: column t: poses {apart:g} s apart, at most {SLOWEST:g} s allowed; "
+            "give times in seconds"
+        )
+    return found

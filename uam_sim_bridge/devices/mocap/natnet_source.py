@@ -15,15 +15,12 @@ import time
 
 import numpy as np
 
-from uam_sim_bridge.devices.mocap import natnet_messages as messages
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 
 try:
-    from natnet.version import Version
-
-    from uam_sim_bridge.devices.mocap.natnet_reader import UNREADABLE, read_frame, read_models
+    from uam_sim_bridge.devices.mocap import natnet_messages as messages
 except ImportError:
-    Version = None
+    messages = None
 
 CONNECT_PERIOD = 0.5  # [s] between two attempts
 LIST_PERIOD = 1.0  # [s] between two requests of the list of bodies, and two keep-alives
@@ -45,7 +42,7 @@ class NatNetSource:
         local: address of this computer in the tracker's network; "": as routed to the server.
         Raises MocapError.
         """
-        if Version is None:
+        if messages is None:
             raise MocapError(
                 "source natnet needs the package natnet: pip install -e '.[hardware]' in a clone; "
                 "colcon: docs/index.md"
@@ -147,7 +144,7 @@ class NatNetSource:
             elif message == messages.MODEL_DEFINITIONS:
                 self._heard = time.monotonic()
                 self._take_models(content)
-        except UNREADABLE:
+        except messages.UNREADABLE:
             self.bad += 1
         except OSError as error:  # the group cannot be joined for now: asked again
             self.failure = f"cannot receive the frames: {error.strerror}"
@@ -155,8 +152,8 @@ class NatNetSource:
     def _take_models(self, content: bytes) -> None:
         """Read the list of bodies; the old one stays valid if this one cannot be read."""
         try:
-            listed = read_models(content, self._version)
-        except UNREADABLE as error:
+            listed = messages.read_models(content, self._version)
+        except messages.UNREADABLE as error:
             self.failure = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise
         self._names, self.failure = {one.id_num: one.name for one in listed.rigid_bodies}, ""
@@ -172,14 +169,14 @@ class NatNetSource:
             self._data = _datagrams(info.group, info.data_port)
             member = socket.inet_aton(info.group) + socket.inet_aton(self._local)
             self._data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
-        self._info, self._version, self._names = info, Version(*info.version), None
+        self._info, self._version, self._names = info, messages.Version(*info.version), None
         self.sessions += 1
         self._listed = NEVER
         self._maintain()
 
     def _frame(self, content: bytes, arrival: int) -> Frame | None:
         """Read a frame; None before the list of bodies has arrived."""
-        data = read_frame(content, self._version)
+        data = messages.read_frame(content, self._version)
         if data.suffix.tracked_models_changed:  # numbers may belong to other bodies now
             self._names, self._listed = None, NEVER
         if self._names is None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.hil.hil_messages import HilMessages
-from uam_sim_bridge.patience import SLICE, Patience
+from uam_sim_bridge.paced_clock import SLICE, Patience
 from uam_sim_bridge.ports import PortError
 
 

@@ -9,16 +9,20 @@
 | flight controller | all others of the common dialect | bridge |
 | plant, bridge | all of the common dialect | flight controller |
 
-On a full line HIL_SENSOR, HIL_GPS and SET_ATTITUDE_TARGET are sent first (`outbox.py`). HIL_SENSOR
-is thinned to the rate that the line carries (`hil_thinning.py`). A flight controller has its own
+On a full line HIL_SENSOR, HIL_GPS and SET_ATTITUDE_TARGET are sent first. HIL_SENSOR
+is thinned to the rate that the line carries. A flight controller has its own
 clock: the router stamps its motor commands with the time of the newest HIL_SENSOR, and answers a
 dropped HIL_SENSOR with the newest motor commands. When the link to the flight controller is lost,
 the router sends zero motor commands to the plant once.
+
+examples:
+  hitl_router serial:/dev/ttyACM0:921600               instance 0
+  hitl_router serial:/dev/ttyUSB0:460800 --hil-rate 200
+  hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import select
 import signal
@@ -27,8 +31,7 @@ import sys
 import time as clock
 from collections.abc import Sequence
 
-from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, fill_ports, number
-from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
+from uam_sim_bridge.mavlink.hil.sitl_ports import Program, UdpPort, connect, fill_ports, number
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 from uam_sim_bridge.mavlink.transport.pacing import Meter, Outbox
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, Transport, open_transport
@@ -238,26 +241,13 @@ def _stop(*_: object) -> None:
     sys.exit(0)
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Program:
     """Return the parser of the command line."""
-    p = argparse.ArgumentParser(
-        prog=NAME,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Connects a flight controller in HITL mode in place of PX4 SITL: one link to\n"
-        "the flight controller, TCP to the simulator, UDP to the bridge.",
-        epilog="examples:\n"
-        "  hitl_router serial:/dev/ttyACM0:921600               instance 0\n"
-        "  hitl_router serial:/dev/ttyUSB0:460800 --hil-rate 200\n"
-        "  hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3\n",
-    )
+    p = Program(__doc__)
     p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
-    p.add_argument(
-        "--hil-rate",
-        type=number("rate in Hz", 1.0, 1000.0),
-        metavar="HZ",
-        help="highest rate of HIL_SENSOR (default: the rate that the line carries, up to 250)",
-    )
-    add_port_options(p)
+    text = "highest rate of HIL_SENSOR (default: the rate that the line carries, up to 250)"
+    p.option("--hil-rate", "HZ", text, type=number("rate in Hz", 1.0, 1000.0))
+    p.ports()
     return p
 
 

@@ -1,13 +1,18 @@
-"""The autopilot's ports as in PX4 SITL: UDP to the companion computer, TCP to the simulator."""
+"""Ports as in PX4 SITL, UDP to the companion, TCP to the simulator; executables that have them."""
 
 from __future__ import annotations
 
+import argparse
+import math
 import socket
 import time as clock
+from collections.abc import Callable
+from typing import Any
 
+from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message
-from uam_sim_bridge.patience import Patience
-from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.paced_clock import Patience
+from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP, PortError
 
 HOST = "127.0.0.1"
 SILENT = 5.0  # [s]; does not count while the simulation stands still
@@ -104,3 +109,83 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
     link.settimeout(None)
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return link
+
+
+def port(text: str) -> int:
+    """Return a port number; an argparse type."""
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text} is not a port (1..65535)")
+    return int(text)
+
+
+def instance(text: str) -> int:
+    """Return a PX4 instance number; an argparse type."""
+    if not text.isdecimal() or int(text) > 254:
+        raise argparse.ArgumentTypeError(f"{text} is not an instance number (0..254)")
+    return int(text)
+
+
+def number(what: str, low: float, high: float) -> Callable[[str], float]:
+    """Return an argparse type: a number from `low` to `high`; what: its name in errors."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not a {what} ({low:g}..{high:g})")
+        return value
+
+    return read
+
+
+class Program(argparse.ArgumentParser):
+    """The parser of an executable; its methods add options, with the default in the help."""
+
+    def __init__(self, page: str) -> None:
+        """page: the docstring of its module, Executable `name`: ..., which is its help."""
+        super().__init__(
+            prog=page.split("`")[1],
+            description=page,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+
+    def option(self, flag: str, metavar: str, text: str, default: Any = None, **how: Any) -> None:
+        """Add an option with a value."""
+        if default not in (None, ""):
+            text = f"{text} (default %(default)s)"
+        self.add_argument(flag, metavar=metavar, help=text, default=default, **how)
+
+    def switch(self, flag: str, text: str) -> None:
+        """Add an option without a value."""
+        self.add_argument(flag, help=text, action="store_true")
+
+    def instance(self) -> None:
+        """Add the option of the instance number."""
+        text = "PX4 instance number, added to the default ports (default %(default)s)"
+        self.add_argument("-i", "--instance", type=instance, default=0, metavar="N", help=text)
+
+    def vehicle(self) -> None:
+        """Add the option of the vehicle."""
+        text = "description, as in config/vehicle/"
+        self.option("--vehicle", "NAME|FILE", text, DEFAULT_VEHICLE)
+
+    def ports(self) -> None:
+        """Add the options of instance, simulator and companion ports."""
+        self.instance()
+        self.option("--sim-host", "HOST", "simulator", HOST)
+        self.option("--sim-port", "PORT", "simulator (default 4560 + N)", type=port)
+        self.option("--mavlink-port", "PORT", "own UDP port (default 14580 + N)", type=port)
+        text = "UDP destination until a peer sends a message (default 14540 + N)"
+        self.option("--companion-port", "PORT", text, type=port)
+        wait = number("time in seconds", 0.0, 86400.0)
+        self.option("--wait", "SECONDS", "longest wait for the simulator", 60.0, type=wait)
+
+
+def fill_ports(options: argparse.Namespace) -> None:
+    """Fill in the instance's default for each port that is not given."""
+    n = options.instance
+    options.sim_port = options.sim_port or SIMULATOR_TCP + n
+    options.mavlink_port = options.mavlink_port or AUTOPILOT_UDP + n
+    options.companion_port = options.companion_port or OFFBOARD_UDP + n

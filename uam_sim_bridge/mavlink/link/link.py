@@ -15,9 +15,8 @@ from uam_control.offboard.autopilot_magnet import AutopilotMagnet
 from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import MavCmd, MavResult, Severity
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
-from uam_control.setpoints.desired import Target
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
-from uam_control.setpoints.vision_pose import VisionPose
+from uam_control.setpoints.targets import Target, VisionPose
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, vision_message
 from uam_sim_bridge.mavlink.protocol.signing import Signing
@@ -25,12 +24,11 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAss
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import NUMBER as HIGHRES_IMU
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
-from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import request as parameter_request
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import setting as parameter_setting
+from uam_sim_bridge.mavlink.telemetry.parameter_check import request as parameter_request
+from uam_sim_bridge.mavlink.telemetry.parameter_check import setting as parameter_setting
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
-from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
+from uam_sim_bridge.mavlink.telemetry.streams import LinkStatistics, StreamCheck
 from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
 from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
 from uam_sim_bridge.mavlink.transport.transport import Transport

@@ -6,16 +6,16 @@ import numpy as np
 
 from uam_control.frames import swap_euler, swap_world
 from uam_control.maths.rotations import euler_from_quaternion
-from uam_control.setpoints.desired import Target
 from uam_control.setpoints.targets import (
     ACCELERATION_IGNORED,
     VELOCITY_IGNORED,
     YAW_RATE_IGNORED,
     AttitudeTarget,
     PositionTarget,
+    Target,
+    VisionPose,
     WrenchTarget,
 )
-from uam_control.setpoints.vision_pose import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
 GROUP = 0  # of SET_ACTUATOR_CONTROL_TARGET: flight controls

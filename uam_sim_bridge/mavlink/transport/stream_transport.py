@@ -1,4 +1,4 @@
-"""MAVLink over a byte stream (TCP, serial): whole frames, no blocking, reopened after a loss.
+"""MAVLink over a byte stream (TCP, serial, USB): whole frames, no blocking, reopened after a loss.
 
 A frame that does not fit into the system's buffer is dropped and counted. The rest of a partly
 written frame is sent before the next frame, so the receiver never gets half a frame. After a loss
@@ -7,12 +7,26 @@ written frame is sent before the next frame, so the receiver never gets half a f
 
 from __future__ import annotations
 
+import errno
+import os
+import select
+import socket
+import termios
 import time
 from collections.abc import Callable
+
+import serial
+
+from uam_sim_bridge.mavlink.transport.udp_transport import resolve
+from uam_sim_bridge.ports import PortError
 
 FIRST_RETRY, LAST_RETRY = 0.1, 5.0  # s between attempts to open: first value, doubled up to last
 CHUNK = 65536  # bytes
 READ_LIMIT = 1 << 20  # bytes per call: bounds the time of a call
+BITS_PER_BYTE = 10  # start, eight data bits, stop
+CONNECT_PATIENCE = 3.0  # s, time limit of one attempt to connect
+# ms without an acknowledgement after which the link is lost: setpoints must not arrive much later
+SILENT_PEER = 1500
 
 
 class StreamTransport:
@@ -129,3 +143,125 @@ class StreamTransport:
 
     def _shut(self) -> None:
         raise NotImplementedError
+
+
+class SerialTransport(StreamTransport):
+    """A serial device, opened exclusively; opened again after it was unplugged."""
+
+    def __init__(
+        self,
+        device: str,
+        baud: int,
+        clock: Callable[[], float] = time.monotonic,
+        absent: bool = False,
+    ) -> None:
+        """Open `device` at `baud` [bit/s]; raises PortError in one line if that fails.
+
+        absent: the device may be plugged in later, as after a loss.
+        """
+        super().__init__(clock)
+        self._device, self._baud = device, baud
+        self.bytes_per_second = baud / BITS_PER_BYTE
+        self._port: serial.Serial | None = None
+        try:
+            self.connected = self._open(0.0)
+        except (OSError, ValueError, OverflowError) as error:
+            if absent and isinstance(error, OSError):
+                self._shut()
+                return
+            raise PortError(f"serial device {device} at {baud} baud: {_reason(error)}") from None
+
+    def _open(self, now: float) -> bool:
+        try:
+            self._port = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
+        except termios.error as error:  # unplugged during open; pyserial does not convert it
+            raise OSError(*error.args) from None
+        return True
+
+    def _read(self) -> bytes:
+        # An unplugged device is always readable and returns no bytes. Without select, read would
+        # not distinguish it from an idle line.
+        if not select.select([self._port.fileno()], [], [], 0.0)[0]:
+            return b""
+        data = os.read(self._port.fileno(), CHUNK)
+        if not data:
+            raise ConnectionResetError
+        return data
+
+    def _write(self, data: bytes) -> int:
+        return os.write(self._port.fileno(), data)
+
+    def _number(self) -> int:
+        return self._port.fileno()
+
+    def _shut(self) -> None:
+        port, self._port = self._port, None
+        if port is not None:
+            try:
+                port.close()
+            except OSError:  # unplugged
+                pass
+
+
+def _reason(error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    if number == errno.EWOULDBLOCK:
+        return "in use by another program"
+    if number:
+        return os.strerror(number)
+    return " ".join(str(error).split())
+
+
+class TcpTransport(StreamTransport):
+    """TCP client; connects later if the server is not listening yet, and again after a loss."""
+
+    def __init__(
+        self, remote: tuple[str, int], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """remote: host, port. Raises PortError for an unknown host; a closed port is no error."""
+        super().__init__(clock)
+        self._remote = (resolve(remote[0]), remote[1])  # at start-up: DNS may take seconds
+        self._socket: socket.socket | None = None
+        self._until = 0.0
+        self._ready()
+
+    def _open(self, now: float) -> bool:
+        if self._socket is None:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            self._socket.setblocking(False)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_PEER)
+            self._until = now + CONNECT_PATIENCE
+            code = self._socket.connect_ex(self._remote)
+            if code not in (0, errno.EINPROGRESS):
+                raise OSError(code, os.strerror(code))
+        if not select.select([], [self._socket], [], 0.0)[1]:
+            if now > self._until:
+                raise TimeoutError
+            return False
+        code = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if code:
+            raise OSError(code, os.strerror(code))
+        if self._socket.getsockname() == self._socket.getpeername():
+            raise ConnectionRefusedError  # no server: on loopback the socket connected to itself
+        return True
+
+    def _read(self) -> bytes:
+        try:
+            data = self._socket.recv(CHUNK)
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise ConnectionResetError
+        return data
+
+    def _write(self, data: bytes) -> int:
+        return self._socket.send(data)
+
+    def _number(self) -> int:
+        return self._socket.fileno()
+
+    def _shut(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None

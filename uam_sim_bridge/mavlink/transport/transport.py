@@ -13,8 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from uam_sim_bridge.mavlink.transport.serial_transport import SerialTransport
-from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
+from uam_sim_bridge.mavlink.transport.stream_transport import SerialTransport, TcpTransport
 from uam_sim_bridge.mavlink.transport.udp_transport import READ_LIMIT, UdpTransport
 from uam_sim_bridge.ports import PortError
 
@@ -42,40 +41,6 @@ class Transport(Protocol):
     def fileno(self) -> int: ...
 
     def close(self) -> None: ...
-
-
-class WrappedTransport:
-    """Base of transports around another one, `inner`, which sends and receives the bytes."""
-
-    def __init__(self, inner: Transport) -> None:
-        self.inner = inner
-        self.stream, self.bytes_per_second = inner.stream, inner.bytes_per_second
-
-    @property
-    def connected(self) -> bool:
-        """Return whether the link is open."""
-        return self.inner.connected
-
-    @property
-    def dropped(self) -> int:
-        """Return the number of frames that could not be sent."""
-        return self.inner.dropped
-
-    def send(self, data: bytes) -> bool:
-        """Send to the autopilot."""
-        return self.inner.send(data)
-
-    def receive(self) -> list[bytes]:
-        """Return the bytes received from the autopilot."""
-        return self.inner.receive()
-
-    def fileno(self) -> int:
-        """Return the descriptor of the link."""
-        return self.inner.fileno()
-
-    def close(self) -> None:
-        """Close the link."""
-        self.inner.close()
 
 
 @dataclass(frozen=True)

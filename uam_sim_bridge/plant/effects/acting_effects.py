@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.hooks import Hook, compiled_hook, python_hook, table
+from uam_control.maths.kept_tuple import Hook, compiled_hook, python_hook, table
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
 from uam_sim_bridge.plant.effects.effect import HOOKS, Acting, Bench
 from uam_sim_bridge.plant.sensors import BLOCK

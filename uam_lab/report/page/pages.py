@@ -1,20 +1,22 @@
-"""report.html: one page about the whole flight; it loads nothing from the network."""
+"""report.html, of a flight or of several flights overlaid; it loads nothing from the network."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
 from uam_lab.records.results import templates
 from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.metrics import errors
 from uam_lab.records.results.result_folder import PX4_LOG, read_json
-from uam_lab.report.facts import change_rows, flight_summary, stability_rows
+from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows
 from uam_lab.report.facts import parameter_table as parameters
-from uam_lab.report.figures import fault_marks
+from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import FIGURES
-from uam_lab.report.page.figure_entries import figure_entries
+from uam_lab.report.figures.panels import DrawnFlight
+from uam_lab.report.figures.zoomable import library
 from uam_lab.report.video.flight_video import Rendered, existing
 
 FACTS = (
@@ -72,7 +74,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         phases=flight_summary.phase_rows(metrics),
         phase_headings=flight_summary.PHASE_HEADINGS,
         clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
-        changes=change_rows.rows(info),
+        changes=parameter_table.rows(info),
         faults=fault_marks.rows(info),
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
         controller=controller,
@@ -116,3 +118,65 @@ def _embedded(file: Path | None) -> str | None:
 
 def _json(file: Path) -> Mapping[str, Any]:
     return read_json(file) if file.exists() else {}
+
+
+def figure_entries(folder: Path, names: Iterable[str]) -> dict[str, object]:
+    """Return what figures.html.j2 needs: the figures that `folder` has of `names`, and plotly.js.
+
+    Each is a picture, a data URI, which plotly.js replaces where it can: zoomable is its JSON, ""
+    without. plotly.js is 4.6 MB. It is left out where no figure needs it.
+    """
+    found = [_entry(folder, name) for name in names if (folder / f"{name}.png").exists()]
+    needed = any(one["zoomable"] for one in found)
+    return {"figures": found, "library": library() if needed else ""}
+
+
+def _entry(folder: Path, name: str) -> dict[str, str]:
+    file = folder / f"{name}.json"
+    text = file.read_text(encoding="utf-8").replace("<", "\\u003c") if file.exists() else ""
+    picture = templates.embedded(folder / f"{name}.png")
+    caption = FIGURES[name][1]
+    return {"name": name, "caption": caption, "picture": picture, "zoomable": text}
+
+
+def build_overlay(
+    flights: Sequence[DrawnFlight], out: Path, progress: Callable[[str], None] = lambda text: None
+) -> Path:
+    """Write figures/ and report.html to `out`; return the page."""
+    joints = max(flight.series.columns.joints for flight in flights)
+    drawn = figures.draw(flights, out / "figures", progress)
+    progress("page")
+    text = templates.render(
+        "uam_lab.report.page",
+        "overlay.html.j2",
+        labels=[flight.label for flight in flights],
+        tables=[_table(flights, *table) for table in paper.tables(joints)],
+        **figure_entries(out / "figures", drawn),
+    )
+    write_text(out / "report.html", text)
+    return out / "report.html"
+
+
+def labelled(directories: Sequence[Path]) -> list[str]:
+    """Return a label per result folder: its name, or its whole path if two names are equal."""
+    names = [directory.resolve().name for directory in directories]
+    return [
+        name if names.count(name) == 1 else str(directory)
+        for name, directory in zip(names, directories, strict=True)
+    ]
+
+
+def _table(
+    flights: Sequence[DrawnFlight],
+    group: str,
+    heading: str,
+    unit: str,
+    digits: int,
+    names: Sequence[str],
+) -> dict:
+    """Return the RMS errors of one group of coordinates, one row per flight."""
+    rows = []
+    for flight in flights:
+        found = errors(flight.series)[group]
+        rows.append((flight.label, [f"{value:.{digits}f}" for value in found]))
+    return {"heading": heading, "unit": unit, "names": names, "rows": rows}
