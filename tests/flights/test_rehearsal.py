@@ -15,7 +15,7 @@ import yaml
 
 from uam_lab.flights.processes.process_table import nodes
 from uam_lab.flights.vehicle.lab_file import template
-from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE
+from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
 
 pytestmark = pytest.mark.slow
 PATIENCE = 900.0  # [s]
@@ -69,6 +69,11 @@ def too_slow(said, out):
     ],
 )
 def test_a_hover_through_all_devices(tmp_path, changes):
+    if "px4" in changes and changes.get("magnet") == GRIPPER:
+        try:
+            Px4Installation.in_the_loop().require_gripper()
+        except Px4Error as error:
+            pytest.skip(str(error))
     status, said, out = rehearse(tmp_path, **changes)
     lab = yaml.safe_load((out / "lab.yaml").read_text())
     assert lab["autopilot"].startswith("serial:")

@@ -260,6 +260,16 @@ def test_in_the_loop_px4_starts_with_its_lines_and_without_a_simulator(build, tm
     assert not list(tmp_path.glob("uam-px4-*"))
 
 
+def test_a_build_without_its_gripper_is_named(build):
+    Px4Installation(build).require_gripper()  # it does not tell
+    board = build / "px4_boardconfig.h"
+    board.write_text("#define CONFIG_MODULES_PAYLOAD_DELIVERER 1\n")
+    Px4Installation(build).require_gripper()
+    board.write_text("#define CONFIG_BOARD_NOLOCKSTEP 1\n")
+    with pytest.raises(Px4Error, match="made without CONFIG_MODULES_PAYLOAD_DELIVERER"):
+        Px4Installation(build).require_gripper()
+
+
 @pytest.mark.parametrize(
     ("board", "options", "complaint"),
     [

@@ -22,6 +22,7 @@ import argparse
 import os
 from dataclasses import replace
 
+from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_lab.cli.command import Command, Subcommands, chosen_effects, number
 from uam_lab.cli.fly import tell
 from uam_lab.flights.conclude import command_line
@@ -109,6 +110,8 @@ def run(options: argparse.Namespace) -> int:
         px4=px4_of(options.px4_dir, options.px4_params),
         px4_params=tuple(options.px4_params),
     )
+    if settings.px4 is not None and lab.magnet.output.magnet == GRIPPER:
+        settings.px4.require_gripper()
     console = Terminal()
     landing = settings.scenario.landing
     with Progress(console, landing.end) as progress, Interrupts() as stop:

@@ -18,6 +18,7 @@ REQUIRED = (
 _STARTUP = "etc/init.d-posix/rcS"
 _LISTED = "parameters.json"
 _BOARD, _OWN_CLOCK = "px4_boardconfig.h", "CONFIG_BOARD_NOLOCKSTEP 1"
+_GRIPPER = "CONFIG_MODULES_PAYLOAD_DELIVERER 1"
 _IN_SOURCES = "build/px4_sitl_default"
 
 
@@ -69,15 +70,31 @@ class Px4Installation:
 
         A build that does not tell passes.
         """
-        try:
-            own = _OWN_CLOCK in (self.directory / _BOARD).read_text(encoding="utf-8")
-        except OSError:
-            return
-        if not own:
+        board = self._board()
+        if board and _OWN_CLOCK not in board:
             raise Px4Error(
                 f"{self.directory}: made with lockstep; in the loop PX4 has a clock of its own: "
                 "`make px4_sitl_nolockstep`"
             )
+
+    def require_gripper(self) -> None:
+        """Raise Px4Error if this build has no module that answers MAV_CMD_DO_GRIPPER.
+
+        A build that does not tell passes.
+        """
+        board = self._board()
+        if board and _GRIPPER not in board:
+            raise Px4Error(
+                f"{self.directory}: made without CONFIG_MODULES_PAYLOAD_DELIVERER: PX4 answers no "
+                "gripper's command; choose a build with it, or `magnet: actuator`"
+            )
+
+    def _board(self) -> str:
+        """Return what was chosen for the build, "" if it does not tell."""
+        try:
+            return (self.directory / _BOARD).read_text(encoding="utf-8")
+        except OSError:
+            return ""
 
     @classmethod
     def in_the_loop(cls, directory: str | Path | None = None) -> Px4Installation:
