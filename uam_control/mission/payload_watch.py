@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +32,7 @@ from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.supervision import Readings
 
 ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
+RAISED = "stand", "table", "shelf", "box"  # of the environment: not to be landed on
 SPEED = 0.05  # [m/s] peak speed of a change
 SHORTEST = 1.0  # [s] of a change
 
@@ -128,7 +131,8 @@ class PayloadWatch:
         self._places = PlaceHistory()  # of the tool
         self._planned: tuple[GraspWindow, np.ndarray] | None = None  # tool at its descent
         self._left_out: GraspWindow | None = None
-        self._stands = [self._tool_at(window.grip)[:Z] for window in windows]
+        grips = [self._tool_at(window.grip)[:Z] for window in windows]
+        self._stands = [*grips, *_raised(scenario.environment or ())]
 
     @property
     def decisions(self) -> list[GraspDecision]:
@@ -251,6 +255,11 @@ class PayloadWatch:
                 way[:Z] = (p.clear_distance / distance - 1.0) * beside
                 way[Z] = p.clear_height
         return way
+
+
+def _raised(environment: Iterable[Mapping[str, Any]]) -> list[np.ndarray]:
+    """Return the places (2,) [m] of what a vehicle would come down on."""
+    return [np.array(one["position"][:2]) for one in environment if one["kind"] in RAISED]
 
 
 @jit
