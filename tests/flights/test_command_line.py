@@ -38,7 +38,7 @@ OPTIONS = [
     (["--autopilot", "ardupilot"], "unknown autopilot 'ardupilot'; there are: builtin", ""),
     (["--payload-mass", "heavy"], "'heavy' is not a payload mass: a number in kg, at least 0", ""),
     (["--payload-mass", "-0.1"], "'-0.1' is not a payload mass", "at least 0"),
-    (["--payload-mass", "9"], "'9' is not a payload mass: a number in kg", "at most 2"),
+    (["--payload-mass", "9"], "'9' is not a payload mass: a number in kg", "at most 5"),
     (["--wind", "1", "2"], "--wind: expected 3 arguments", ""),
     (["--wind", "1", "2", "nan"], "'nan' is not a wind: a number in m/s", ""),
     (["--seed", "1.5"], "'1.5' is not a seed: a whole number from 0 to 2147483647", ""),

@@ -48,7 +48,7 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
     "options, message",
     [
         (["--seeds", "0"], "1 or more"),
-        (["--payload-mass", "3"], "at most 2"),
+        (["--payload-mass", "9"], "at most 5"),
         (["--profile", "mine"], "LABEL=FILE"),
     ],
 )
