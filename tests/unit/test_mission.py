@@ -394,10 +394,15 @@ def test_a_landing_by_command_does_not_come_down_on_a_stand(scenario, at):
     assert np.linalg.norm(output.reference[0, :2] - begin) > 0.4
 
 
+def on_path(at):
+    """The place (3,) of the path, which rests there."""
+    return Flight("pick_and_place").until(lambda o: o.time > at).reference[0, :3].copy()
+
+
 def regained(lower):
     """By command."""
     flight = released(at=20.0)
-    flight.state[0, :3] = flight.mission._guidance._on_path()[0, :3] - [0.0, 0.0, lower]
+    flight.state[0, :3] = on_path(20.0) - [0.0, 0.0, lower]
     flight.step()
     assert flight.mission.request(OperatorCommand.RESUME)[0]
     flight.step()
@@ -411,7 +416,7 @@ def after_failsafe(lower):
     flight.until(lambda o: o.time > 20.0)
     flight.readings = Readings(mocap_age=9.0)
     flight.until(lambda o: o.state is State.FAILSAFE)
-    flight.state[0, :3] = flight.mission._guidance._on_path()[0, :3] - [0.0, 0.0, lower]
+    flight.state[0, :3] = on_path(20.0) - [0.0, 0.0, lower]
     flight.readings = KNOWN
     return flight
 
@@ -420,8 +425,7 @@ def after_failsafe(lower):
 @pytest.mark.parametrize(("lower", "away"), [(0.05, False), (0.2, True)])
 def test_below_its_path_beside_a_stand_it_leaves_level_before_it_climbs(made, lower, away):
     """Straight up the arm is caught under the stand's top: lost, torn loose at 1.6 m of error."""
-    flight = made(lower)
-    path = flight.mission._guidance._on_path()[0, :3].copy()
+    flight, path = made(lower), on_path(20.0)
     places = np.array([flight.step().reference[0, :3].copy() for _ in range(1500)])
     climbs = int(np.argmax(places[:, 2] > path[2] - 0.9 * lower))
     beside = np.linalg.norm(places[climbs, :2] - path[:2])
