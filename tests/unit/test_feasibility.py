@@ -324,9 +324,9 @@ def test_a_reserve_is_a_share_of_the_thrust_beyond_the_weight():
 def test_a_note_says_that_a_reference_leaves_little_thrust():
     race, circle_ = load_scenario("race_5_payload"), load_scenario("circle")
     check = Feasibility(with_full_thrust(41.4), OPEN, 0.2)
-    assert re.match("the reference needs 29.6 of 36 N, .* --retime leaves some", check.note(race))
-    assert replace(check, limits=replace(OPEN, retime_reserve=0.0)).note(race) == ""
-    assert replace(check, payload_mass=0.0).note(circle_) == ""
+    assert re.match("the reference needs 29.6 of 36 N, .* --retime leaves some", check.check(race))
+    assert replace(check, limits=replace(OPEN, retime_reserve=0.0)).check(race) == ""
+    assert replace(check, payload_mass=0.0).check(circle_) == ""
 
 
 def test_what_a_weak_vehicle_cannot_lift_is_refused_and_retimed():

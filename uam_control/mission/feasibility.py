@@ -16,7 +16,7 @@ from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios.ramps import within_room
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY
-from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario import STANDING, Scenario, ScenarioError
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import NO_GRIPPER, VehicleDescription
 
@@ -42,14 +42,11 @@ class InfeasibleReference(ScenarioError):
 
 
 class _Planned:
-    """A flight from the origin: its times (m,) [s], trajectory, and height [m] at the begin."""
+    """A flight from the origin: its times (m,) [s], and trajectory."""
 
     def __init__(self, scenario: Scenario) -> None:
-        start = standing(scenario.arm_start)
-        self.scenario, self.ground = scenario.begun_at(start), float(start[Z])
-        landing = self.scenario.landing
-        self.trajectory = self.scenario.trajectory(start)
-        self.times = np.arange(0.0, landing.end, STEP)
+        self.scenario, self.trajectory = scenario.from_origin()
+        self.times = np.arange(0.0, self.scenario.landing.end, STEP)
 
 
 @dataclass(frozen=True)
@@ -83,12 +80,12 @@ class Feasibility:
             demand = self._planned(flight, part)
             demand = demand.within(slice(begin - part.start, begin - part.start + PART))
             turn = max(turn, float(demand.turn.max()))
-            if not self._collect(demand, flight.ground, found):
+            if not self._collect(demand, STANDING, found):
                 continue
             phases = np.array([flight.scenario.phase(time) for time in demand.times])
             for leg, excesses in legs.items():
                 if (phases == leg).sum() > 1:
-                    self._collect(demand.within(phases == leg), flight.ground, excesses)
+                    self._collect(demand.within(phases == leg), STANDING, excesses)
         for leg in (RUN_UP, RUN_OUT):  # where the ramp is the reason, it is named
             for key in legs[leg].keys() - legs[TRAJECTORY].keys():
                 found.pop(key, None)
@@ -225,18 +222,17 @@ class Feasibility:
             return ""
         return f"{USABLE:.0%} of the full thrust".replace("%", " %")
 
-    def check(self, scenario: Scenario) -> None:
-        """Raise InfeasibleReference if the scenario exceeds a limit."""
+    def check(self, scenario: Scenario) -> str:
+        """Return a note about a thrust that leaves less than `retime_reserve`, "" for nothing.
+
+        Raises InfeasibleReference if the scenario exceeds a limit.
+        """
+        near = replace(self, reserve=self.limits.retime_reserve).excesses(scenario)
+        if not near:
+            return ""
         if found := self.excesses(scenario):
             raise InfeasibleReference(f"scenario {scenario.name}: {in_words(found)}")
-
-    def note(self, scenario: Scenario) -> str:
-        """Return a note about a thrust that leaves less than `retime_reserve`; "" for nothing."""
-        share = self.limits.retime_reserve
-        found = replace(self, reserve=share).excesses(scenario)
-        most = max((one.value for one in found if one.quantity == THRUST), default=0.0)
-        if not most:
-            return ""
+        most = max(excess.value for excess in near)
         return (
             f"the reference needs {most:.3g} of {self.thrust_limit:.3g} N, and wind, a weak "
             "battery or uneven rotors need thrust, too; --retime leaves some"
@@ -278,40 +274,9 @@ class Feasibility:
         InfeasibleReference if no slowdown up to SLOWEST makes it feasible.
         """
         try:
-            return replace(self, reserve=self.limits.retime_reserve)._slowed(scenario)
+            return _slowed(replace(self, reserve=self.limits.retime_reserve), scenario)
         except InfeasibleReference:
-            return self._slowed(scenario)
-
-    def _slowed(self, scenario: Scenario) -> tuple[Scenario, float]:
-        """Return the scenario and its slowdown, see `retimed`, with the reserve that is set."""
-        scenario = self.fitted(scenario)
-        found = self.excesses(scenario)
-        if not found:
-            return scenario, 1.0
-        chosen = scenario.route is not None and scenario.route.ramps_chosen
-        low, high = 1.0, 1.1
-        while found:
-            places = [
-                excess
-                for excess in found
-                if (excess.unit == "m" and not (chosen and excess.ramp))
-                or "angle" in excess.quantity
-            ]
-            if places or low >= SLOWEST:
-                text = f"{in_words(places or found)}, and a slowdown does not help"
-                raise InfeasibleReference(f"scenario {scenario.name}: {text}")
-            slower = self.fitted(scenario.slowed(high))
-            found = self.excesses(slower)
-            if found:
-                low, high = high, min(high * high, SLOWEST)
-        while high / low > 1.0 + PRECISION:
-            middle = math.sqrt(low * high)
-            if self.excesses(self.fitted(scenario.slowed(middle))):
-                low = middle
-            else:
-                high = middle
-        factor = min(high * ROOM, SLOWEST)
-        return self.fitted(scenario.slowed(factor)), factor
+            return _slowed(self, scenario)
 
     def demand(self, scenario: Scenario) -> Demand:
         """Return what a flight from the origin needs, from the take-off to the landing."""
@@ -328,6 +293,37 @@ class Feasibility:
         for at, energised in scenario.magnet:
             on[times >= at] = energised
         return self.payload_mass * on
+
+
+def _slowed(check: Feasibility, scenario: Scenario) -> tuple[Scenario, float]:
+    """Return the scenario slowed down until it meets the check, and the factor; see `retimed`."""
+    scenario = check.fitted(scenario)
+    found = check.excesses(scenario)
+    if not found:
+        return scenario, 1.0
+    chosen = scenario.route is not None and scenario.route.ramps_chosen
+    low, high = 1.0, 1.1
+    while found:
+        places = [
+            excess
+            for excess in found
+            if (excess.unit == "m" and not (chosen and excess.ramp)) or "angle" in excess.quantity
+        ]
+        if places or low >= SLOWEST:
+            text = f"{in_words(places or found)}, and a slowdown does not help"
+            raise InfeasibleReference(f"scenario {scenario.name}: {text}")
+        slower = check.fitted(scenario.slowed(high))
+        found = check.excesses(slower)
+        if found:
+            low, high = high, min(high * high, SLOWEST)
+    while high / low > 1.0 + PRECISION:
+        middle = math.sqrt(low * high)
+        if check.excesses(check.fitted(scenario.slowed(middle))):
+            low = middle
+        else:
+            high = middle
+    factor = min(high * ROOM, SLOWEST)
+    return check.fitted(scenario.slowed(factor)), factor
 
 
 def in_words(excesses: list[Excess]) -> str:

@@ -19,7 +19,7 @@ from uam_control.mission import Scenario, ScenarioError
 from uam_control.mission.motion.flatness import attitudes
 from uam_control.mission.motion.trajectory import reference_rows
 from uam_control.mission.scenarios.environment import PAYLOAD, default_environment
-from uam_control.mission.scenarios.scenario import standing
+from uam_control.mission.scenarios.scenario import STANDING
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
 from uam_sim_bridge.plant.arm_geometry import BASE, room_below
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
@@ -49,10 +49,8 @@ def check_standing(
             raise
         return
     _check_surroundings(vehicle, scenario)
-    start = standing(scenario.arm_start)
-    flown = scenario.begun_at(start)
-    end = flown.landing.end
-    last = reference_rows(flown.trajectory(start), np.array([end]), len(vehicle.joints))
+    flown, path = scenario.from_origin()
+    last = reference_rows(path, np.array([flown.landing.end]), len(vehicle.joints))
     told = ScenarioError, f"scenario {scenario.name}:"
     for (error, where), what, angles in (
         ((VehicleError, f"{vehicle.file}: joints:"), "stowed", vehicle.stowed),
@@ -113,16 +111,14 @@ def _beside(
     model: mujoco.MjModel, payload: Entry, vehicle: VehicleDescription, scenario: Scenario
 ) -> str:
     """Return a note about a tool that first closes farther than BESIDE from where it grips."""
-    start, chain = standing(scenario.arm_start), chain_of(vehicle)
-    flown = scenario.begun_at(start)
+    (flown, path), chain = scenario.from_origin(), chain_of(vehicle)
     windows = grasp_windows(flown.motions, flown.magnet, dict(flown.approaches))
     if not windows or not chain.has_hand:
         return ""
     window, data = windows[0], mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     place = data.body(PAYLOAD).xpos + [0.0, 0.0, payload["size"][2] / 2] + window.approach.point
-    times = np.array([window.grip])
-    rows = reference_rows(flown.trajectory(start), times, len(vehicle.joints))
+    rows = reference_rows(path, np.array([window.grip]), len(vehicle.joints))
     off = hand_and_levers(chain, rows[CHI, 0])[0] - place
     if (far := float(np.linalg.norm(off))) < BESIDE:
         return ""
@@ -162,13 +158,12 @@ def _poses(
     model: mujoco.MjModel, vehicle: VehicleDescription, scenario: Scenario
 ) -> Iterator[tuple[float, mujoco.MjData]]:
     """Yield times [s] and data of the poses of the flight that are judged."""
-    start = standing(scenario.arm_start)
-    flown = scenario.begun_at(start)
+    flown, path = scenario.from_origin()
     end = flown.landing.at
     times = np.linspace(0.0, end, min(MOST, int(end / STEP) + 2))
-    rows = reference_rows(flown.trajectory(start), times, len(vehicle.joints))
+    rows = reference_rows(path, times, len(vehicle.joints))
     chi, force = rows[CHI], rows[CHI_DDOT, :, POSITION] + [0.0, 0.0, vehicle.gravity]
-    judged = chi[:, Z] - start[Z] > NEAR
+    judged = chi[:, Z] - STANDING > NEAR
     for at, _ in flown.magnet:
         judged &= (times < at - GRIPS[0]) | (times > at + GRIPS[1])
     data, base = mujoco.MjData(model), model.joint(BASE).qposadr[0]

@@ -191,8 +191,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         about = f"retimed: {how}"
     else:
         scenario = feasible.fitted(scenario)
-        feasible.check(scenario)
-        about = feasible.note(scenario)
+        about = feasible.check(scenario)
     clearance.check_standing(vehicle, scenario, o.plant)
     effects = presets.read(o.plant_preset, o.effects)
     made = FlightSettings(

@@ -70,31 +70,31 @@ class Px4Installation:
 
         A build that does not tell passes.
         """
-        board = self._board()
-        if board and _OWN_CLOCK not in board:
-            raise Px4Error(
-                f"{self.directory}: made with lockstep; in the loop PX4 has a clock of its own: "
-                "`make px4_sitl_nolockstep`"
-            )
+        self._require(
+            _OWN_CLOCK,
+            "made with lockstep; in the loop PX4 has a clock of its own: "
+            "`make px4_sitl_nolockstep`",
+        )
 
     def require_gripper(self) -> None:
         """Raise Px4Error if this build has no module that answers MAV_CMD_DO_GRIPPER.
 
         A build that does not tell passes.
         """
-        board = self._board()
-        if board and _GRIPPER not in board:
-            raise Px4Error(
-                f"{self.directory}: made without CONFIG_MODULES_PAYLOAD_DELIVERER: PX4 answers no "
-                "gripper's command; choose a build with it, or `magnet: actuator`"
-            )
+        self._require(
+            _GRIPPER,
+            "made without CONFIG_MODULES_PAYLOAD_DELIVERER: PX4 answers no gripper's command; "
+            "choose a build with it, or `magnet: actuator`",
+        )
 
-    def _board(self) -> str:
-        """Return what was chosen for the build, "" if it does not tell."""
+    def _require(self, choice: str, otherwise: str) -> None:
+        """Raise Px4Error, with what it is otherwise, if the build tells its choices without one."""
         try:
-            return (self.directory / _BOARD).read_text(encoding="utf-8")
+            board = (self.directory / _BOARD).read_text(encoding="utf-8")
         except OSError:
-            return ""
+            return
+        if board and choice not in board:
+            raise Px4Error(f"{self.directory}: {otherwise}")
 
     @classmethod
     def in_the_loop(cls, directory: str | Path | None = None) -> Px4Installation:

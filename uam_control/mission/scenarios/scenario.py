@@ -136,6 +136,12 @@ class Scenario:
             return self
         return routed(self, self.route.flight(start))
 
+    def from_origin(self) -> tuple[Scenario, Trajectory]:
+        """Return scenario and reference of a take-off at the origin, with the arm of its start."""
+        start = standing(self.arm_start)
+        begun = self.begun_at(start)
+        return begun, begun.trajectory(start)
+
     def along(self, route: Route) -> Scenario:
         """Return the flight along another route."""
         return replace(self, route=route).begun_at(standing(self.arm_start))
