@@ -56,3 +56,22 @@ def drone(axes=ARM, count=4, coaxial=False, mount="0 0 0", mass=1.5, length=0.12
         lines.append('<link name="tool0"/>')
         lines.append(joint("tool", above, "tool0", f"0 0 {-length}"))
     return "\n".join([*lines, "</robot>", ""])
+
+
+FINGERS = (
+    f'<link name="left_finger">{inertial(0.01, 0.02)}</link>\n'
+    f'<link name="right_finger">{inertial(0.01, 0.02)}</link>\n'
+    + joint("finger_left", "arm_1", "left_finger", "0 0.01 -0.12", "prismatic",
+            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>')
+    + "\n"
+    + joint("finger_right", "arm_1", "right_finger", "0 -0.01 -0.12", "prismatic",
+            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>'
+            '<mimic joint="finger_left"/>')
+    + "\n</robot>"
+)  # fmt: skip
+SECOND_ARM = (
+    f'<link name="other">{inertial(0.1, 0.05)}</link>\n'
+    + joint("other_joint", "base_link", "other", "0 0.1 0", "revolute",
+            more='<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>')
+    + "\n</robot>"
+)  # fmt: skip

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 import yaml
-from urdf_texts import drone, inertial, joint
+from imported_vehicle import imported, posed, write
+from urdf_texts import FINGERS, SECOND_ARM, drone, joint
 
 from uam_control.arm.hand import hinge_angles
 from uam_control.settings.configuration import path
@@ -37,29 +38,6 @@ VEHICLES = {
     "tilted mount": {"mount": "0.3 -0.4 0.7", "axes": ("0 1 0", "1 0 0", "0.6 0.8 0")},
     "small": {"mass": 0.45, "length": 0.06, "axes": ("1 0 0", "0 1 0")},
 }
-
-
-def write(folder, text, name="mine.urdf"):
-    file = folder / name
-    file.write_text(text)
-    return file
-
-
-def imported(folder, text, name="mine.urdf", chosen=None, answers=None, arm_of=None):
-    file = write(folder, text, name)
-    made = importer.import_vehicle(
-        file, folder / "out", "mine", chosen or Chosen(), answers or Answers(), arm_of
-    )
-    return made, Vehicle.of(made.description).compile(0.0)
-
-
-def posed(model, names, angles):
-    data = mujoco.MjData(model)
-    for name, angle in zip(names, angles, strict=True):
-        data.joint(name).qpos = angle
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    return data
 
 
 @pytest.mark.parametrize("what", VEHICLES)
@@ -223,99 +201,6 @@ def test_a_wrong_answer_is_refused(tmp_path, given, said):
     assert said in str(error.value)
 
 
-def line_of(text, part):
-    return text[: text.index(part)].count("\n") + 1
-
-
-FINGERS = (
-    f'<link name="left_finger">{inertial(0.01, 0.02)}</link>\n'
-    f'<link name="right_finger">{inertial(0.01, 0.02)}</link>\n'
-    + joint("finger_left", "arm_1", "left_finger", "0 0.01 -0.12", "prismatic",
-            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>')
-    + "\n"
-    + joint("finger_right", "arm_1", "right_finger", "0 -0.01 -0.12", "prismatic",
-            more='<axis xyz="0 1 0"/><limit lower="0" upper="0.02" effort="1" velocity="1"/>'
-            '<mimic joint="finger_left"/>')
-    + "\n</robot>"
-)  # fmt: skip
-SECOND_ARM = (
-    f'<link name="other">{inertial(0.1, 0.05)}</link>\n'
-    + joint("other_joint", "base_link", "other", "0 0.1 0", "revolute",
-            more='<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>')
-    + "\n</robot>"
-)  # fmt: skip
-POINT, FLAT = (
-    '<inertial><mass value="0.08"/>'
-    f'<inertia ixx="{x}" iyy="{x}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    for x, z in ((0, 0), (1e-5, 3e-5))
-)
-HOSTILE = {  # what is replaced by what → what is said, and the text in whose line it is
-    "cycle": ('<child link="tool0"/>', '<child link="arm_0"/>', "link 'arm_0' hangs on", '"tool"'),
-    "prismatic": (
-        'name="joint_1" type="revolute"',
-        'name="joint_1" type="prismatic"',
-        "joint 'joint_1': prismatic joint in the arm",
-        'name="joint_1"',
-    ),
-    "planar": ('name="tool" type="fixed"', 'name="tool" type="planer"', "type 'planer'", '"tool"'),
-    "negative mass": ('value="0.08"', 'value="-0.08"', "link 'arm_0': mass -0.08 kg", '"arm_0"'),
-    "no inertia": (inertial(0.08, 0.06), "", "body 'arm_0': no mass", '"arm_0"'),
-    "zero inertia": (inertial(0.08, 0.06), POINT, "is nothing", '"arm_0"'),
-    "impossible inertia": (inertial(0.08, 0.06), FLAT, "must satisfy A + B >= C", '"arm_0"'),
-    "not a number": ('xyz="0.02 0 -0.06"', 'xyz="0.02 nan -0.06"', "3 finite numbers", "joint_0"),
-    "in mm": ('xyz="0.02 0 -0.06"', 'xyz="20 0 -60"', "lengths in mm", '"joint_0"'),
-    "duplicate": ('<link name="tool0"/>', '<link name="arm_0"/>', "is there twice", "tool0"),
-    "unknown link": ('parent link="arm_1"', 'parent link="arm_9"', "'arm_9' is no link", '"tool"'),
-    "two roots": ("</robot>", '<link name="alone"/>\n</robot>', "several roots", ""),
-    "axis": ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "an axis of zeros", '"joint_0"'),
-    "limits": ('lower="-1.8"', 'lower="2.8"', "lower 2.8 is above upper 1.9", '"joint_0"'),
-    "two arms": ("</robot>", SECOND_ARM, "several arms hang on the base", ""),
-    "bomb": ("<robot", '<!DOCTYPE x [<!ENTITY a "b">]>\n<robot', "document type", ""),
-    "mass in g": ('<mass value="1.5"/>', '<mass value="1500"/>', "kg: in g?", '"base_link"'),
-    "inertia in g mm^2": (
-        inertial(0.08, 0.06),
-        inertial(0.08, 0.06).replace("e-05", "e+04"),
-        "in g mm^2?",
-        '"arm_0"',
-    ),
-    "limit in degrees": ('upper="1.9"', 'upper="109"', "109 rad is over two turns", '"joint_0"'),
-    "no XML": ("</robot>", "", "no XML", ""),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", HOSTILE)
-def test_a_file_that_contradicts_is_refused_by_line(tmp_path, what):
-    plain, broken, said, where = HOSTILE[what]
-    text = drone()
-    assert plain in text
-    with pytest.raises(ImportRefused) as error:
-        imported(tmp_path, text.replace(plain, broken, 1))
-    message = str(error.value)
-    assert said in message and "\n" not in message
-    if where:
-        assert f"mine.urdf line {line_of(text, where)}" in message
-    assert not (tmp_path / "out" / "mine.yaml").exists()
-
-
-def test_a_base_without_mass_is_refused(tmp_path):
-    text = drone().replace('<mass value="1.5"/>', '<mass value="0"/>').replace("0.01", "0")
-    with pytest.raises(ImportRefused, match="'base_link': no mass|base has no mass"):
-        imported(tmp_path, text)
-
-
-@pytest.mark.parametrize(
-    ("name", "made"),
-    [("a.urdf.xacro", "a.urdf"), ("a.xacro", "a.urdf"), ("a.urdf", "a_plain.urdf")],
-)
-def test_another_file_is_refused_with_the_way_to_a_urdf(tmp_path, name, made):
-    """The command that is printed does not write over the file that it reads."""
-    with pytest.raises(ImportRefused, match="<sdf>: URDF or MJCF expected$"):
-        imported(tmp_path, "<sdf version='1.6'/>", name)
-    macros = '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="x"/></robot>'
-    with pytest.raises(ImportRefused, match=f"xacro macros; xacro {name} > {made} first"):
-        imported(tmp_path, macros, name)
-
-
 def test_fingers_are_no_joints_of_the_arm(tmp_path):
     made, model = imported(tmp_path, drone().replace("</robot>", FINGERS))
     assert made.description.joint_names == ("joint_0", "joint_1")
@@ -453,90 +338,6 @@ def test_motors_of_gazebo_are_read(tmp_path):
     assert not any("lag_up" in line for line in made.missing)
 
 
-MJCF = """<mujoco><worldbody><body name="x2" pos="0 0 0.1"><freejoint/>
-<geom type="box" size=".1 .1 .03" mass="1.2"/>
-<site name="thrust1" pos="-.14 -.18 .05"/><site name="thrust2" pos="-.14 .18 .05"/>
-<site name="thrust3" pos=".14 .18 .08"/><site name="thrust4" pos=".14 -.18 .08"/>
-<body name="upper" pos="0 0 -.05"><joint name="shoulder" axis="0 1 0" pos="0 0 .01" range="-90 90"/>
-<geom type="capsule" fromto="0 0 0 0 0 -.1" size=".01" mass=".1"/>
-<site name="gripper_tip" pos="0 0 -.12"/></body></body></worldbody>
-<actuator><motor name="a" site="thrust1" gear="0 0 1 0 0 -.02" ctrlrange="0 7"/>
-<motor name="b" site="thrust2" gear="0 0 1 0 0 .02" ctrlrange="0 7"/>
-<motor name="c" site="thrust3" gear="0 0 1 0 0 -.02" ctrlrange="0 7"/>
-<motor name="d" site="thrust4" gear="0 0 1 0 0 .02" ctrlrange="0 7"/></actuator></mujoco>"""
-
-
-def test_an_mjcf_tells_thrust_and_turns_by_its_actuators(tmp_path):
-    """A moment along -z per thrust is that of a counter-clockwise rotor; joint 0.04 m below."""
-    made, model = imported(tmp_path, MJCF, "x2.xml")
-    rotor = made.description.rotor
-    assert rotor.thrust_max == pytest.approx(7.0, rel=1e-4)
-    assert rotor.moment_ratio == 0.02
-    turned = [one.counter_clockwise for one in made.description.rotors]
-    assert turned == [True, False, True, False]
-    here = posed(model, ("shoulder",), (0.0,))
-    assert here.joint("shoulder").xanchor - here.body("base").xpos == pytest.approx((0, 0, -0.04))
-    assert here.body("magnet").xpos - here.body("base").xpos == pytest.approx((0, 0, -0.17))
-
-
-@pytest.mark.parametrize("inertial", [True, False])
-def test_a_missing_mesh_of_an_mjcf_is_left_out_where_the_body_has_its_own_mass(tmp_path, inertial):
-    """With its default flags a mesh collides, and makes the mass of a body without one."""
-    body = '<body name="x2" pos="0 0 0.1">'
-    assert body in MJCF
-    mesh = '<asset><mesh name="hull" file="hull.stl"/></asset><worldbody>'
-    given = MJCF.replace("<worldbody>", mesh, 1)
-    own = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/>' if inertial else ""
-    given = given.replace(body, f'{body}{own}<geom type="mesh" mesh="hull"/>', 1)
-    if inertial:
-        made, _ = imported(tmp_path, given, "x2.xml")
-        assert any("hull.stl is missing: not shown" in one for one in made.missing)
-    else:
-        with pytest.raises(ImportRefused, match=r"x2.xml line \d+: mesh .*hull.stl is missing"):
-            imported(tmp_path, given, "x2.xml")
-
-
-def test_what_collides_is_shown_where_nothing_visible_is(tmp_path):
-    """A base whose only shape to look at is invisible, as of a public X2: its box is drawn."""
-    unseen = '<geom type="sphere" size=".05" mass="0" contype="0" conaffinity="0" rgba="0 0 0 0"/>'
-    given = MJCF.replace("<freejoint/>", f"<freejoint/>{unseen}", 1)
-    _, model = imported(tmp_path, given, "x2.xml")
-    own = np.flatnonzero(model.geom_bodyid == model.body("base").id)
-    boxes = own[model.geom_type[own] == mujoco.mjtGeom.mjGEOM_BOX]
-    assert model.geom_size[boxes].tolist() == [[0.1, 0.1, 0.03]]
-
-
-@pytest.mark.parametrize(("turn", "said"), [("180 0 0", "180"), ("0 20 0", "20"), ("0 0 90", "")])
-def test_a_base_whose_z_axis_does_not_point_up_is_refused(tmp_path, turn, said):
-    """A frame of x forward, z down would hang the arm on top; a heading is no matter."""
-    text = MJCF.replace('pos="0 0 0.1"', f'pos="0 0 0.1" euler="{turn}"', 1)
-    if not said:
-        imported(tmp_path, text, "x2.xml")
-        return
-    with pytest.raises(ImportRefused, match=f"body 'x2': its z axis is {said} deg from up"):
-        imported(tmp_path, text, "x2.xml")
-
-
-def test_a_spring_of_an_mjcf_is_named_as_it_is_left_out(tmp_path):
-    made, _ = imported(
-        tmp_path, MJCF.replace('axis="0 1 0"', 'axis="0 1 0" stiffness="5"'), "x.xml"
-    )
-    assert any("joint shoulder: its spring is left out" in line for line in made.missing)
-
-
-def test_a_link_that_ends_at_its_joint_is_refused(tmp_path):
-    """The tool, too, is within 10 mm of the last joint: nothing says where the hand points."""
-    flat = inertial(0.08, 0.06).replace('xyz="0 0 -0.03"', 'xyz="0 0 0"')
-    text = drone(length=0.004, axes=("0 1 0",)).replace(inertial(0.08, 0.06), flat)
-    with pytest.raises(ImportRefused, match="no far end: an end effector 10 mm from it is needed"):
-        imported(tmp_path, text)
-
-
-def test_an_mjcf_without_finite_numbers_is_refused_by_line(tmp_path):
-    with pytest.raises(ImportRefused, match=r"x2.xml line 5: <body pos='0 0 nan'>: finite numbers"):
-        imported(tmp_path, MJCF.replace('pos="0 0 -.05"', 'pos="0 0 nan"'), "x2.xml")
-
-
 @pytest.mark.parametrize(
     "names", [("1", "1e3"), ("no", "null"), ("a, b", "c: #d"), ("[x]", " 'y"), ("!t", "関 節")]
 )
@@ -552,23 +353,6 @@ def test_a_joint_with_a_name_of_ours_is_refused(tmp_path):
         imported(tmp_path, drone().replace("joint_0", "alpha_2").replace("joint_1", "alpha_1"))
     with pytest.raises(ImportRefused, match=r"joint 'base': another name is needed"):
         imported(tmp_path, drone().replace("joint_0", "base"))
-
-
-def test_directions_that_make_roll_and_yaw_one_are_not_taken(tmp_path):
-    """Both rotors of a side turn alike in this file: neighbours turn against each other then."""
-    text = MJCF.replace("0 0 1 0 0 -.02", "left").replace("0 0 1 0 0 .02", "right")
-    for old, new in (("left", "-"), ("right", ""), ("left", ""), ("right", "-")):
-        text = text.replace(old, f"0 0 1 0 0 {new}.02", 1)
-    made, _ = imported(tmp_path, text, "x2.xml")
-    turned = [one.counter_clockwise for one in made.description.rotors]
-    assert turned in ([True, False] * 2, [False, True] * 2)
-    told = "rotors.layout (assumed: neighbours turn in opposite directions, with those of the file"
-    assert any(told in line for line in made.missing)
-
-
-def test_an_error_of_mujoco_names_file_and_line(tmp_path):
-    with pytest.raises(ImportRefused, match=r"x2.xml.*line 2"):
-        imported(tmp_path, MJCF.replace('type="box"', 'type="bax"'), "x2.xml")
 
 
 def test_a_vehicle_of_this_project_comes_back(tmp_path):
