@@ -36,7 +36,7 @@ class Rig:
     """Plant, estimator and controllers as seen by the bridge, tick by tick."""
 
     def __init__(self, probe, start, *arguments):
-        self.local, self.remote = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
+        self.local, self.remote = free_port(), free_port()
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", self.remote))
         self.socket.setblocking(False)

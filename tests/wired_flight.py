@@ -6,7 +6,6 @@ the same each time. Every byte that the bridge sends is kept.
 
 from __future__ import annotations
 
-import socket
 import struct
 from unittest import mock
 
@@ -101,7 +100,7 @@ class WiredAutopilot:
 
     def connect(self) -> None:
         """Open new sockets: at the start, and in a fork, whose sockets must be its own."""
-        codec, ports = Codec(1, 1), [free_port(socket.SOCK_DGRAM) for _ in range(2)]
+        codec, ports = Codec(1, 1), [free_port() for _ in range(2)]
         self._udp, self._second = (UdpPort(port, 9, codec) for port in ports)
         self.transport = self.link._transport = _Kept((HOST, ports[0]))
         self.ground = GroundStation(ports[1])

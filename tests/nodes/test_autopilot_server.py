@@ -38,8 +38,8 @@ class Flight:
     """Quadrotor, HIL server, the autopilot's process and the bridge's link, in lockstep."""
 
     def __init__(self, start, signing=None, arguments=()):
-        self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
-        self.local = free_port(socket.SOCK_DGRAM)
+        self.tcp, self.udp = free_port(), free_port()
+        self.local = free_port()
         self.hil = HilServer(self.tcp, 4, parameters=PATIENT)
         self.server = start(
             MODULE,
@@ -251,7 +251,7 @@ def test_ends_with_the_simulator(flight):
 def test_wrong_use_is_one_line_and_status_2(arguments, message, capsys):
     own = signal.getsignal(signal.SIGTERM)
     try:
-        status = server.main([*arguments, "--mavlink-port", str(free_port(socket.SOCK_DGRAM))])
+        status = server.main([*arguments, "--mavlink-port", str(free_port())])
     except SystemExit as ended:  # of the parser
         status = ended.code
     finally:
@@ -270,7 +270,7 @@ def test_a_used_udp_port_is_a_one_line_error(start):
 
 
 def test_sigterm_ends_it_quietly(start):
-    ports = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
+    ports = free_port(), free_port()
     waiting = start(MODULE, "--once", "--sim-port", ports[0], "--mavlink-port", ports[1])
     waiting.until_logged("waiting for the simulator")
     assert waiting.interrupt(number=signal.SIGTERM) == 0

@@ -1,7 +1,5 @@
 """Diagnostics of every node: level, loop time, ages of its inputs."""
 
-import socket
-
 import numpy as np
 import pytest
 from free_port import free_port
@@ -32,8 +30,8 @@ NODES = {
 def arguments(name, folder):
     """Return arguments with free ports and a temporary file."""
     own = {
-        "mujoco_sim": [f"hil_port:={free_port(socket.SOCK_STREAM)}"],
-        "mavlink_bridge": [f"local_port:={free_port(socket.SOCK_DGRAM)}"],
+        "mujoco_sim": [f"hil_port:={free_port()}"],
+        "mavlink_bridge": [f"local_port:={free_port()}"],
         "recorder": [f"file:={folder / 'log.mcap'}"],
     }.get(name, [])
     return ["--ros-args", *(word for value in own for word in ("-p", value))]

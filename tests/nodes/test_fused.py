@@ -1,6 +1,5 @@
 """The fused layout over ROS: what is seen from outside, who may publish, what is sent."""
 
-import socket
 import time
 
 import numpy as np
@@ -24,7 +23,7 @@ TICKS = 100
 
 
 def port():
-    return "--ros-args", "-p", f"mavlink_bridge:local_port:={free_port(socket.SOCK_DGRAM)}"
+    return "--ros-args", "-p", f"mavlink_bridge:local_port:={free_port()}"
 
 
 def seen(node, name, space):
@@ -43,7 +42,7 @@ def seen(node, name, space):
 def arguments(space, folder):
     """Namespace and a port of the bridge; `-p node:name` reaches no node in a namespace."""
     file = folder / f"{space[1:]}.yaml"
-    bridge = {"local_port": free_port(socket.SOCK_DGRAM)}
+    bridge = {"local_port": free_port()}
     file.write_text(yaml.safe_dump({wiring.BRIDGE: {"ros__parameters": bridge}}))
     return "--ros-args", "-r", f"__ns:={space}", "--params-file", file
 

@@ -69,8 +69,8 @@ class Bench:
 
     def __init__(self, start, *arguments, hil=HIL):
         self.cable = Cable()
-        tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
-        local = free_port(socket.SOCK_DGRAM)
+        tcp, self.udp = free_port(), free_port()
+        local = free_port()
         self.hil = HilServer(tcp, 4, parameters=hil)
         self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
         self.autopilot.until_logged("on the serial line")
@@ -196,7 +196,7 @@ class Wires:
         self.device = device
         self.plug()
         self.listener = socket.create_server(("127.0.0.1", 0))
-        self.udp, port = free_port(socket.SOCK_DGRAM), self.listener.getsockname()[1]
+        self.udp, port = free_port(), self.listener.getsockname()[1]
         self.bridge = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.bridge.bind(("127.0.0.1", 0))
         self.bridge.settimeout(PATIENCE)
@@ -347,7 +347,7 @@ def test_the_router_continues_after_reconnection(wires):
     ],
 )
 def test_wrong_use_is_one_line_and_status_2(start, arguments, complaint):
-    ports = ["--mavlink-port", str(free_port(socket.SOCK_DGRAM))]
+    ports = ["--mavlink-port", str(free_port())]
     router = start(ROUTER, *ports, *arguments)
     assert router.process.wait(PATIENCE) == 2
     assert complaint in router.output.strip().splitlines()[-1]

@@ -1,6 +1,5 @@
 """The laboratory as a node: its devices on real pseudo-terminals and sockets, its truth on ROS."""
 
-import socket
 import subprocess
 import sys
 import time
@@ -23,7 +22,7 @@ def laboratory(start, tmp_path):
     """The node, and the TCP port for the autopilot."""
 
     def make(*settings):
-        port = free_port(socket.SOCK_STREAM)
+        port = free_port()
         own = (
             f"folder:={tmp_path}",
             "hardware:=s500_lab",

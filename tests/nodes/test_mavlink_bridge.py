@@ -1,7 +1,6 @@
 """The bridge node over real ROS and real UDP, with the autopilot's objects on the other end."""
 
 import math
-import socket
 import time
 
 import numpy as np
@@ -21,7 +20,7 @@ from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 
 def test_alone_it_waits_and_stops(start):
-    node = start(MODULE, "--ros-args", "-p", f"local_port:={free_port(socket.SOCK_DGRAM)}")
+    node = start(MODULE, "--ros-args", "-p", f"local_port:={free_port()}")
     node.until_logged(
         "waiting for /vrpn_mocap/uam/pose, /uam/state, /uam/position/command, /uam/attitude/command"
     )

@@ -13,7 +13,7 @@ MODULE = "uam_sim_bridge.nodes.mujoco_sim"
 
 
 def options(**values):
-    arguments = ["--ros-args", "-p", f"hil_port:={free_port(socket.SOCK_STREAM)}"]
+    arguments = ["--ros-args", "-p", f"hil_port:={free_port()}"]
     for name, value in values.items():
         arguments += ["-p", f"{name}:={value}"]
     return arguments
@@ -86,7 +86,7 @@ def test_the_list_of_wires_is_that_of_the_running_nodes(start, probe, tmp_path):
         )
     ]
     nodes = [start(module) for module in modules]
-    ports = ["--ros-args", "-p", f"local_port:={free_port(socket.SOCK_STREAM)}"]
+    ports = ["--ros-args", "-p", f"local_port:={free_port()}"]
     nodes += [start(MODULE, *options()), start("uam_sim_bridge.nodes.mavlink_bridge", *ports)]
     file = ["--ros-args", "-p", f"file:={tmp_path / 'log.mcap'}"]
     nodes.append(start("uam_lab.records.recorder", *file))

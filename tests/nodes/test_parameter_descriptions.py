@@ -1,7 +1,6 @@
 """Every parameter of every node is described, ranged, and refused with a reason."""
 
 import math
-import socket
 
 import pytest
 from free_port import free_port
@@ -35,11 +34,11 @@ EVERY_NODE = {"fifo_priority", "nice", "tick_times_kept"}
 def arguments(node, folder):
     """Arguments by which several of these nodes run beside other programs."""
     own = {
-        wiring.BRIDGE: {"local_port": free_port(socket.SOCK_DGRAM)},
-        wiring.PLANT: {"hil_port": free_port(socket.SOCK_STREAM)},
+        wiring.BRIDGE: {"local_port": free_port()},
+        wiring.PLANT: {"hil_port": free_port()},
         wiring.RECORDER: {"file": folder / "log.mcap"},
         wiring.COCKPIT: {"port": 0},
-        wiring.FLIGHT_CONTROLLER: {f"{wiring.BRIDGE}:local_port": free_port(socket.SOCK_DGRAM)},
+        wiring.FLIGHT_CONTROLLER: {f"{wiring.BRIDGE}:local_port": free_port()},
     }.get(node, {})
     return ["--ros-args", *(w for name, value in own.items() for w in ("-p", f"{name}:={value}"))]
 

@@ -1,7 +1,6 @@
 """A node that measures its ticks, on the cores that it may use."""
 
 import os
-import socket
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +81,7 @@ def test_a_node_that_polls_answers_every_tick(start, probe):
 
 def test_nodes_of_one_process_share_its_ticks(start, probe, tmp_path):
     every = (wiring.FLIGHT_CONTROLLER, *wiring.FUSED)
-    words = ["-p", f"{wiring.BRIDGE}:local_port:={free_port(socket.SOCK_DGRAM)}"]
+    words = ["-p", f"{wiring.BRIDGE}:local_port:={free_port()}"]
     for name in every:
         words += ["-p", f"{name}:tick_times:={tmp_path / name}.npz"]
     node = start(FUSED, "--ros-args", *words)

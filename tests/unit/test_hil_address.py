@@ -12,7 +12,7 @@ from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilServer, open_only
     ("address", "reached"), [("127.0.0.1", False), ("127.0.0.2", True), ("0.0.0.0", True)]
 )
 def test_the_port_is_open_at_its_address_only(address, reached):
-    port = free_port(socket.SOCK_STREAM)
+    port = free_port()
     server = HilServer(port, 4, address)
     try:
         with socket.socket() as autopilot:
@@ -34,5 +34,5 @@ def test_only_loopback_addresses_are_open_only_here():
 
 def test_an_address_of_another_machine_is_a_one_line_error():
     with pytest.raises(HilError, match="for the autopilot at 192.0.2.1") as error:
-        HilServer(free_port(socket.SOCK_STREAM), 4, "192.0.2.1")
+        HilServer(free_port(), 4, "192.0.2.1")
     assert "\n" not in str(error.value)

@@ -5,8 +5,6 @@ The checklist's own objects look at the plant through the emulated devices, with
 
 from __future__ import annotations
 
-import socket
-
 import numpy as np
 import pytest
 from free_port import free_port
@@ -42,7 +40,7 @@ class Rehearsed:
     def __init__(self, folder, *mistakes):
         wiring = Schedule(tuple(timed({**m, "at": "start"}, {}, "test") for m in mistakes))
         devices = Devices(folder, CHAIN, 921600, "uam", "", CALIBRATED, 0, folder / "magnet")
-        port = free_port(socket.SOCK_STREAM)
+        port = free_port()
         self.lab = Laboratory(Vehicle.of(VEHICLE), devices, port, 0.2, 1, (), wiring)
         (self._body,) = mistaken_room([RoomBody("uam", CALIBRATED)], wiring)
         self.person = Person(VEHICLE.joint_names, self.lab.folded)
