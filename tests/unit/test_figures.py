@@ -8,7 +8,7 @@ from PIL import Image
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import analyse
 from uam_lab.records.results import metrics
-from uam_lab.records.results.timeseries import Series, gain_columns
+from uam_lab.records.results.timeseries import Series, columns, gain_columns
 from uam_lab.report.figures import figures, panels, style
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_sim_bridge.plant import Vehicle
@@ -145,6 +145,21 @@ def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
     assert [axis.get_yscale() for axis in alone.axes[::3]] == ["linear", "log"]
     both = figures.adaptation([DrawnFlight("modular", flight), other])
     assert [axis.get_ylabel() for axis in both.axes[::3]][4:] == rows
+
+
+def test_the_theta_hat_of_every_joint_is_drawn_beside_a_flight_with_fewer_joints(flight):
+    found = columns(joints=5, rotors=4)
+    values = np.full((len(flight.values), len(found)), np.nan)
+    values[:, found["time"]] = flight.time
+    values[:, gain_columns("arm", [f"bias{i}" for i in range(1, 6)], found)] = [1, 2, 3, 4, 5]
+    series = Series(values, flight.phases, flight.phase_names, flight.info, found)
+    figure = figures.adaptation([DrawnFlight("five", series), DrawnFlight("two", flight)])
+    rows = [axis.get_ylabel() for axis in figure.axes[::3]]
+    arm = figure.axes[3 * rows.index("$\\hat\\theta$") + 2]
+    assert [line.get_ydata()[0] for line in arm.lines[:5]] == [1, 2, 3, 4, 5]
+    assert len({line.get_color() for line in arm.lines[:5]}) == 5
+    legend = [text.get_text() for text in arm.get_legend().get_texts()]
+    assert legend == [f"$\\hat\\theta_{i}$" for i in range(1, 6)]
 
 
 def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):

@@ -103,9 +103,10 @@ def payload(flights: Sequence[DrawnFlight]) -> Figure | None:
 
 def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
     """Draw the adapted gains and their inputs by subsystem; return None without any."""
+    most = max(AXES, *(flight.series.columns.joints for flight in flights))
     shown = [
         group
-        for group in catalogue.gain_groups(AXES)
+        for group in catalogue.gain_groups(most)
         if group.label and any(_adapted(f, group.names) for f in flights)
     ]
     if not shown:
@@ -149,8 +150,11 @@ def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
 
 def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:
     """Return whether the flight has any of these gains, in any subsystem: one that is not zero."""
-    columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
-    return any(np.nan_to_num(flight.series[column]).any() for column in columns)
+    return any(
+        np.nan_to_num(flight.series[column]).any()
+        for column in (f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names)
+        if column in flight.series.columns
+    )
 
 
 def _adaptation_of(
@@ -158,7 +162,9 @@ def _adaptation_of(
 ) -> None:
     series = flight.series
     for i, name in enumerate(group.names):
-        values = series[f"adaptation.{subsystem}.{name}"]
+        if (column := f"adaptation.{subsystem}.{name}") not in series.columns:
+            continue  # of a flight with fewer joints than another
+        values = series[column]
         shown = series.flown & (np.isfinite(values) if group.signed else values > 0.0)
         if shown.any():
             several = len(group.names) > 1  # then the colour marks the gain, the dash the flight

@@ -27,9 +27,8 @@ MEAN_S = 0.2  # [s] averaging time of the forces, against the noise of the estim
 BUCKETS = 400  # of a line
 COUPLING, ADAPTIVE, FEEDBACK, INTEGRAL = style.INK, *style.FLIGHTS[:3]
 ACTUATORS = "#9aa5af"
-TERMS = dict(
-    zip(("tracking", "gains", "$\\zeta$", "$\\hat\\theta$"), np.roll(style.GAINS, -1), strict=True)
-)
+_COLOURS = np.roll(style.GAINS[:4], -1)
+TERMS = dict(zip(("tracking", "gains", "$\\zeta$", "$\\hat\\theta$"), _COLOURS, strict=True))
 
 
 def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:

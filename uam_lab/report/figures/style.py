@@ -21,7 +21,7 @@ GRID = "#e3e7eb"
 BAND = "#f3f5f7"
 # One colour per flight; distinguishable with the common colour-vision deficiencies and in grey.
 FLIGHTS = ("#1f5fa8", "#d9822b", "#2a9d8f", "#a63d57", "#7b6bb0", "#6b7680")
-GAINS = ("#0b3c6f", "#3f7fbf", "#57a773", "#d9822b")
+GAINS = ("#0b3c6f", "#3f7fbf", "#57a773", "#d9822b", "#7b6bb0", "#a63d57", "#6b7680")
 PICK = "#2a8a57"
 DROP = "#c2512f"
 CHANGE = "#7b4fa3"
