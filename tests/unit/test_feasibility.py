@@ -25,7 +25,7 @@ from uam_lab.flights.flight_settings import settings as flight_settings
 PROFILE = load_profile("s500")
 OPEN = replace(
     PROFILE.sets["mission"], reference_thrust=36.0, reference_tilt=1.2, tilt_hold=1.25,
-    tilt_failsafe=1.4, reference_yaw_rate=5.0,
+    tilt_failsafe=1.4, reference_yaw_rate=8.0, reference_yaw_torque=1.0,
 )  # fmt: skip
 IN_TIME = PROFILE.sets["mission"]
 TIMES = np.arange(0.0, 3.0, 0.01)
@@ -208,6 +208,27 @@ def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     np.testing.assert_allclose(demand.joint_torques[100], [first, second], rtol=2e-3)
 
 
+def test_the_torque_about_yaw_turns_vehicle_arm_and_payload():
+    """4 rad/s^2 with both links down: 0.025 kg m^2 of the body and little of the rest. Links and
+    0.2 kg held forward, horizontally: each mass by the square of its distance more."""
+    lying = (math.pi / 2, 0.0, 0.0)
+    down, empty, loaded = (
+        checked().needs.along(
+            Motion(lambda t, one=one: rows(yaw=(2 * t * t, 4 * t, 4.0), **one)), TIMES, mass
+        )
+        for one, mass in (
+            ({}, np.zeros(len(TIMES))),
+            ({"alpha_1": lying}, np.zeros(len(TIMES))),
+            ({"alpha_1": lying}, np.full(len(TIMES), 0.2)),
+        )
+    )
+    assert 4.0 * 0.025 < down.yaw_torque[100] < 4.0 * 0.0265
+    more = loaded.yaw_torque - empty.yaw_torque
+    np.testing.assert_allclose(more, 4.0 * 0.2 * 0.240**2, rtol=1e-6)
+    links = 0.177 * 0.0745**2 + 0.09 * 0.175**2 + 0.07 * 0.240**2
+    assert empty.yaw_torque[100] - down.yaw_torque[100] == pytest.approx(4.0 * links, rel=0.2)
+
+
 def test_the_magnet_must_hold_the_payloads_apparent_weight():
     """0.2 kg at 10 m/s^2 upwards weigh 3.96 N; a magnet of 3 N is refused."""
     up = Motion(lambda t: rows(z=(5.0 * t * t, 10.0 * t, 10.0)))
@@ -235,6 +256,7 @@ def test_the_refusal_says_what_exceeds_which_limit_and_when():
         ({"reference_tilt": 0.3}, "tilt 0.387 rad exceeds 0.3 rad at"),
         ({"reference_thrust": 22.0}, "thrust 23.8 N exceeds 22 N at"),
         ({"reference_body_rate": 0.5}, r"body rate 0.8\d* rad/s exceeds 0.5 rad/s at"),
+        ({"reference_yaw_torque": 0.01}, r"yaw torque 0.0\d+ N m exceeds 0.01 N m at"),
         ({"reference_turn": 2.0}, r"body rate 2.\d+ rad/s\^2 exceeds 1.54 rad/s\^2 at"),
         (
             {"reference_turn": 4.0, "reference_delay": 0.04},
@@ -388,6 +410,7 @@ def test_limits_of_the_body_rates_follow_from_bridge_and_attitude_controller(tmp
     assert limits.reference_body_rate == pytest.approx(3.6)
     assert limits.reference_yaw_rate == pytest.approx(1.8)
     assert limits.reference_turn == pytest.approx(15.0)  # 0.75 * 0.66 / 0.033
+    assert limits.reference_yaw_torque == pytest.approx(0.225)  # 0.75 * 0.3
 
 
 @pytest.mark.parametrize("given", ["[1.0, 2.0]", "3.0", "fast"])

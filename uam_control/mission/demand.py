@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.chain import Chain, carrying
-from uam_control.arm.kinematics import inverse_dynamics
+from uam_control.arm.kinematics import vehicle_dynamics
 from uam_control.coordinates import (
     ALPHA,
     ARM,
@@ -72,10 +72,9 @@ class Demand(NamedTuple):
     """What a reference needs at times (m,) [s] of mission time.
 
     position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; turn (m,) [rad/s^2]: change of those of roll and pitch; yaw_rate (m,) [rad/s];
-    angles (m, n) [rad]; joint_rates (m, n) [rad/s];
-    joint_torques (m, n) [N m] and magnet_force (m,) [N], the payload's apparent weight, NaN if the
-    arm's masses are unknown.
+    [rad/s, FLU]; turn (m,) [rad/s^2]: change of those of roll and pitch; angles (m, n) [rad];
+    joint_rates (m, n) [rad/s]; yaw_torque (m,) [N m, FLU] of the rotors, joint_torques (m, n) [N m]
+    and magnet_force (m,) [N], the payload's apparent weight, NaN if the masses are unknown.
     """
 
     times: np.ndarray
@@ -85,9 +84,9 @@ class Demand(NamedTuple):
     tilt: np.ndarray
     body_rates: np.ndarray
     turn: np.ndarray
-    yaw_rate: np.ndarray
     angles: np.ndarray
     joint_rates: np.ndarray
+    yaw_torque: np.ndarray
     joint_torques: np.ndarray
     magnet_force: np.ndarray
 
@@ -102,7 +101,7 @@ class Needs:
 
     The force follows from the acceleration, the weight and the drag; it points along the body's z
     axis, which with yaw gives the attitude; its derivative gives the body rates. The joint torques
-    follow from the motion of the arm's masses.
+    and the torque about yaw follow from the motion of all masses.
     """
 
     vehicle: VehicleDescription
@@ -128,32 +127,34 @@ class Needs:
             np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
             rates,
             _changes(rates[:, : YAW - ROLL]),
-            turning[:, 2],
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
-            *self._arm_loads(rows, rotation, rates, carried),
+            *self._loads(rows, rotation, rates, carried),
         )
 
-    def _arm_loads(
+    def _loads(
         self, rows: np.ndarray, rotation: np.ndarray, rates: np.ndarray, carried: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N].
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return `Demand.yaw_torque`, `Demand.joint_torques` and `Demand.magnet_force`.
 
         rows (3, m, 6 + n): the reference; rotation (m, 3, 3), rates (m, 3) [rad/s]: of the base.
         """
         count, joints = len(carried), rows.shape[2] - ALPHA
         if self.chain is None:
-            return np.full((count, joints), np.nan), np.full(count, np.nan)
+            unknown = np.full(count, np.nan)
+            return unknown, np.full((count, joints), np.nan), unknown
         turning, gravity = np.gradient(rates, STEP, axis=0), self.vehicle.gravity
         motion = np.ascontiguousarray(rows), rotation, rates, turning, gravity
         torques, push, pull = np.empty((count, joints)), np.empty((count, 3)), np.zeros(count)
-        _arm_torques(self.chain, *motion, torques, push)
+        yaw = np.empty(count)
+        _write_loads(self.chain, *motion, torques, push, yaw)
         for mass in np.unique(carried[carried > 0.0]):
-            loaded, more = np.empty_like(torques), np.empty_like(push)
-            _arm_torques(carrying(self.chain, mass), *motion, loaded, more)
+            loaded, more, turns = (np.empty_like(one) for one in (torques, push, yaw))
+            _write_loads(carrying(self.chain, mass), *motion, loaded, more, turns)
             at = carried == mass
-            torques[at], pull[at] = loaded[at], np.linalg.norm(more - push, axis=1)[at]
-        return torques, pull
+            torques[at], yaw[at] = loaded[at], turns[at]
+            pull[at] = np.linalg.norm(more - push, axis=1)[at]
+        return yaw, torques, pull
 
     @property
     def chain(self) -> Chain | None:
@@ -199,7 +200,7 @@ def _turns(
 
 
 @jit
-def _arm_torques(
+def _write_loads(
     chain: Chain,
     rows: np.ndarray,
     rotation: np.ndarray,
@@ -208,18 +209,21 @@ def _arm_torques(
     gravity: float,
     torques: np.ndarray,
     push: np.ndarray,
+    yaw: np.ndarray,
 ) -> None:
-    """Write the joint torques (m, n) [N m] with friction, and the force on the arm (m, 3) [N].
+    """Write the joint torques (m, n) [N m] with friction, the force (m, 3) [N] and the torque about
+    yaw (m,) [N m] that act on the vehicle, both FLU.
 
-    See `Needs._arm_loads`; turning (m, 3) [rad/s^2]; gravity [m/s^2].
+    See `Needs._loads`; turning (m, 3) [rad/s^2]; gravity [m/s^2].
     """
     for k in range(len(torques)):
         acceleration = vector(rows[CHI_DDOT, k, X:ROLL])
         force = (acceleration[0], acceleration[1], acceleration[2] + gravity)
         force = turned(transposed(matrix_rows(rotation[k])), force)
         base = force, vector(rates[k]), vector(turning[k])
-        found, _ = inverse_dynamics(chain, rows[:, k, ALPHA:], *base, torques[k])
+        found, moment = vehicle_dynamics(chain, rows[:, k, ALPHA:], *base, torques[k])
         push[k, 0], push[k, 1], push[k, 2] = found
+        yaw[k] = moment[2]
         for i in range(torques.shape[1]):
             speed = rows[CHI_DOT, k, ALPHA + i]
             torques[k, i] += chain.damping[i] * speed

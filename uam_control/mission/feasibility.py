@@ -129,7 +129,7 @@ class Feasibility:
         p = self.limits
         ground = demand.position[0, Z] if ground is None else ground
         low, high = self._room(ground)
-        place, upper = demand.position.T, [*self._motion(demand), *self._arm(demand)]
+        place, upper = demand.position.T, [*self._motion(demand), *self._loads(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
         if self.needs.chain is not None:
@@ -170,12 +170,13 @@ class Feasibility:
             ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
             ("body rate", rates, min(p.reference_body_rate, p.body_rate_hold), "rad/s"),
             ("change of the body rate", demand.turn, p.largest_turn, "rad/s^2"),
-            ("yaw rate", np.abs(demand.yaw_rate), p.reference_yaw_rate, "rad/s"),
+            ("yaw rate", np.abs(demand.body_rates[:, YAW - ROLL]), p.reference_yaw_rate, "rad/s"),
         ]
 
-    def _arm(self, demand: Demand) -> list[tuple[str, np.ndarray, float, str]]:
-        """Return the same of arm and magnet."""
-        p, found = self.limits, []
+    def _loads(self, demand: Demand) -> list[tuple[str, np.ndarray, float, str]]:
+        """Return the same of the torques of rotors and joints, and of the magnet."""
+        p = self.limits
+        found = [("yaw torque", np.abs(demand.yaw_torque), p.reference_yaw_torque, "N m")]
         for i in range(demand.angles.shape[1]):
             rate, torque = (
                 np.abs(values[:, i]) for values in (demand.joint_rates, demand.joint_torques)

@@ -86,7 +86,8 @@ class BrakeLimits(ParameterSet):
 class FeasibilityLimits(ParameterSet):
     """Limits of the reference before take-off, in addition to the supervisor's. Without a value
     in the profile they are the position controller's thrust_max and tilt_max, 90 % of the bridge's
-    rate_limit, and 75 % of the attitude controller's torque_max / inertia: the law needs the rest.
+    rate_limit, and 75 % of the attitude controller's torque_max / inertia, about yaw of its
+    torque_max: the law needs the rest.
     """
 
     reference_thrust: float = number(36.0, "largest force that a reference needs", "N", 0.1, 1e3)
@@ -99,6 +100,9 @@ class FeasibilityLimits(ParameterSet):
     )
     reference_yaw_rate: float = number(
         2.7, "largest yaw rate that a reference needs", "rad/s", 0.01, 50.0
+    )
+    reference_yaw_torque: float = number(
+        0.225, "largest torque about yaw that a reference needs", "N m", 1e-4, 1e3
     )
     reference_turn: float = number(
         34.0,

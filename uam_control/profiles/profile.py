@@ -283,6 +283,7 @@ def reference_limits(
     if inertia := getattr(attitude, "inertia", ()):  # laws of users may have none
         turns = np.divide(attitude.torque_max, inertia)[: YAW - ROLL]
         limits["reference_turn"] = TURNED * float(turns.min())
+        limits["reference_yaw_torque"] = TURNED * float(attitude.torque_max[YAW - ROLL])
     return limits | jog_limits(attitude)
 
 
