@@ -30,6 +30,8 @@ def shares(
 ) -> dict[str, dict[str, Any]]:
     """Return subsystem → share of the true coupling that each term carries, <term, H> / <H, H>.
 
+    H of the arm has the weight of the links in it here, as most of these laws feed none forward.
+
     Terms: adaptive; feedback: that of the law without its gains; added: what the controller adds to
     the law (integral action, known loads, limits); actuators: what they do beyond tau (None for the
     arm, whose torque is not recorded). rms: of H over all axes [N or N m].
@@ -48,6 +50,8 @@ def shares(
     true = dynamics.along(series, rows, vehicle, payload_mass)
     acceleration = series.block("truth.")[rows, 2 * series.columns.size :]
     plant = coupling.coupling_force(true, acceleration, sets)
+    limits = sets[NODE_OF["position"]]
+    plant[:, Z] -= limits.gravity_feedforward_mass * limits.gravity
     wrench = supply.rotor_wrench(series, rows, body)
     found = {}
     for name in SUBSYSTEMS:

@@ -9,6 +9,7 @@ from default_columns import COLUMNS
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
+from uam_lab.analysis.coupling import nominal_inertia
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.stability import analyse_folder
 from uam_lab.analysis.supply import COLUMNS_OF
@@ -182,14 +183,11 @@ def test_a_real_flight(analysed):
     position, attitude, arm = (found[name] for name in ("position", "attitude", "arm"))
     # theta_hat holds the payload's weight; the autopilot compensates the arm's torque
     assert position["coupling"]["rms"][2] == pytest.approx(1.23, abs=0.1)
-    assert 0.7 < position["coupling"]["adaptive_share"] < 1.1
+    assert 0.8 < position["coupling"]["adaptive_share"] < 1.1
     assert attitude["coupling"]["actuators_share"] > 0.9
-    # the known load of the arm is fed forward; the rest is the payload's
-    arm_shares = arm["coupling"]["feedforward_share"] + arm["coupling"]["adaptive_share"]
-    assert 0.9 < arm_shares < 1.1
-    assert 0.4 < arm["coupling"]["adaptive_share"] < 0.5
-    assert 0.8 < arm["coupling"]["unknown_share"] < 1.1
-    assert 0.8 < position["coupling"]["unknown_share"] < 1.1
+    # the weight of the links is known and fed forward; the rest is the payload's
+    assert 0.5 < arm["coupling"]["known_share"] < 0.6
+    assert 0.8 < arm["coupling"]["adaptive_share"] < 1.1
     assert arm["coupling"]["actuators_share"] is None
     assert position["xi_max"] < position["xi_bound"]
     assert found["assumptions"]["saturated"]["position"] < 0.01
@@ -199,11 +197,12 @@ def test_a_real_flight(analysed):
 
 
 def test_sigma_satisfies_the_error_equation(analysed, direct_flight):
-    """Eq. (9), err1: Mbar chi_ddot = tau + Mbar sigma, tau without the weight fed forward."""
-    force = analysed.supply.tau[:, :3] - analysed.supply.weight[:, :3]
-    acceleration = analysed.coupling.sigma[:, :3] + force / 2.2
-    true = direct_flight.block("truth.")[analysed.rows, 16:19]
-    np.testing.assert_allclose(acceleration, true, atol=1e-9)
+    """Eq. (9), err1: Mbar chi_ddot = tau + Mbar sigma, tau without known loads."""
+    force = analysed.supply.tau - analysed.supply.known
+    inertia = nominal_inertia(load_profile("s500").sets)
+    acceleration = analysed.coupling.sigma + force / inertia
+    true = direct_flight.block("truth.")[analysed.rows, 16:24]
+    np.testing.assert_allclose(acceleration, true, atol=1e-6)
     regressors = constants.regressor(analysed.truth)
     for name, one in analysed.subsystems.items():
         sigma = analysed.coupling.sigma[:, COLUMNS_OF[name]]

@@ -135,7 +135,7 @@ def test_terms_of_the_law_add_up_to_the_recorded_tau(direct_flight):
     # the force is for the mass that theta_hat holds up
     law *= 1.0 + carried[:, 2:3] / p.inertia[2] / p.gravity
     law += carried
-    law += terms.weight[:, :3]
+    law[:, 2] += p.gravity_feedforward_mass * p.gravity
     np.testing.assert_allclose(law, terms.tau[:, :3], atol=1e-6)
-    others = terms.feedforward + terms.feedback + terms.adaptive + terms.weight + terms.integral
+    others = terms.feedforward + terms.feedback + terms.adaptive + terms.known + terms.integral
     np.testing.assert_allclose(others, terms.tau, atol=1e-9)

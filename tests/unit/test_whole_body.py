@@ -148,7 +148,10 @@ def test_a_joint_that_is_cut_is_missing_at_the_base():
     np.testing.assert_allclose(torque - free_q, coupling.T @ (joints - free), atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", [1, 6, 7, 11, 13, 23])  # 1, 4 and 7 joints: each is compiled
+# 4 joints; 1 and 7 joints, for which the law is compiled half a minute each
+@pytest.mark.parametrize(
+    "seed", [1, 6, *(pytest.param(one, marks=pytest.mark.long) for one in (7, 11, 13, 23))]
+)
 def test_any_arm_of_one_to_seven_joints(seed):
     """At rest it holds every random vehicle; beside its reference the outputs are finite."""
     random = np.random.default_rng(seed)

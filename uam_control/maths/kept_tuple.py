@@ -26,15 +26,6 @@ if compiled.numba is not None:
     from numba.extending import intrinsic
 
     @intrinsic
-    def _store(typing: Any, address: types.Type, value: types.Type) -> tuple:
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            of = context.get_value_type(value).as_pointer()
-            builder.store(arguments[1], builder.inttoptr(arguments[0], of))
-            return context.get_dummy_value()
-
-        return types.void(types.intp, value), code
-
-    @intrinsic
     def _load(typing: Any, address: types.Type, like: types.TypeRef) -> tuple:
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             of = context.get_value_type(like.instance_type).as_pointer()
@@ -43,9 +34,26 @@ if compiled.numba is not None:
         return like.instance_type(types.intp, like), code
 
 
-@compiled.borrowing
-def _keep(address: int, value: Any) -> None:
-    _store(address, value)
+def _image(value: Any) -> tuple[bytes, int]:
+    """Return a value as numba has it in memory, and the alignment [bytes]: a struct of C.
+
+    An array is (owner, object, size, itemsize, data, shape, strides); nobody counts references
+    here, so it has neither owner nor object. Raises TypeError for what is no array or number.
+    """
+    if isinstance(value, tuple):
+        found, widest = b"", 1
+        for image, alignment in map(_image, value):
+            found += bytes(-len(found) % alignment) + image
+            widest = max(widest, alignment)
+        return found + bytes(-len(found) % widest), widest
+    if isinstance(value, np.ndarray):
+        of = 0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides
+        return np.array(of).tobytes(), 8
+    if isinstance(value, (bool, np.bool_)):
+        return bytes([value]), 1
+    if isinstance(value, (int, float, np.int64)):
+        return np.array(value).tobytes(), 8
+    raise TypeError(f"a tuple in memory has arrays and numbers, not {type(value).__name__}")
 
 
 class KeptTuple:
@@ -61,11 +69,10 @@ class KeptTuple:
             self.address, self.read = 0, lambda _: values
             return
         kind = numba.typeof(values)
-        target = cpu_target.target_context
-        size = target.get_abi_sizeof(target.get_value_type(kind))
-        self._memory = np.zeros(size, dtype=np.uint8)
+        target, (image, _) = cpu_target.target_context, _image(values)
+        assert len(image) == target.get_abi_sizeof(target.get_value_type(kind))
+        self._memory = np.frombuffer(image, dtype=np.uint8).copy()
         self.address, self.read = self._memory.ctypes.data, _reader(kind)
-        _keep(self.address, values)
 
 
 def bound(function: Callable, values: tuple, *arguments: object) -> Callable:

@@ -76,12 +76,12 @@ def from_the_paper(
 ) -> np.ndarray:
     """Return K* (4,) from the expressions below eq. (11), each norm the largest of the flight.
 
-    g_bar is the bound of g minus the weight fed forward; d_bar is the bound of `coupling.rest`.
+    g_bar is the bound of g minus the known loads; d_bar is the bound of `coupling.rest`.
     """
     columns = COLUMNS_OF[subsystem]
     inertia = nominal_inertia(sets)[columns]
     inverse = float(np.max(1.0 / inertia))
-    gravity = np.linalg.norm((dynamics.gravity - supply.weight)[:, columns], axis=1).max()
+    gravity = np.linalg.norm((dynamics.gravity - supply.known)[:, columns], axis=1).max()
     rest = np.linalg.norm(coupling.rest[:, columns], axis=1).max()
     moving = truth.rate > SLOWEST
     coriolis = 0.0

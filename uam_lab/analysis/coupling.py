@@ -8,8 +8,8 @@ Eq. (6), dynamics_p; (16), dynamics_q; (23), dynamics_alpha:
 Here E_j = H_j + d_j. H_j comes from the rigid-body model of the plant, d_j is the remainder. tau_j
 is the command of the law, so d_j contains the difference between command and actuators (rotor
 lag, delays, integrator of the autopilot's rate loop), friction, drag, contacts and the pivot of
-the magnet. The weight fed forward (`gravity_feedforward_mass`) is known, so it is no uncertainty:
-H_p does not contain it, and sigma_j = -Mbar_j^-1 E_j is the sigma_j of eq. (9), err1.
+the magnet. What tau_j has of known loads (`Supply.known`: the weight, the arm's links) is no
+uncertainty: H_j does not contain it, and sigma_j = -Mbar_j^-1 E_j is the sigma_j of eq. (9), err1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, Z
+from uam_control.coordinates import ALPHA
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 
@@ -41,17 +41,14 @@ class Coupling:
 
 def along(dynamics: Dynamics, acceleration: np.ndarray, supply: Supply, sets: dict) -> Coupling:
     """Return H, d and sigma from the true dynamics, the true chi_ddot (m, 8) and tau."""
-    plant = coupling_force(dynamics, acceleration, sets)
+    plant = coupling_force(dynamics, acceleration, sets) - supply.known
     rest = supply.tau - dynamics.required(acceleration)
     return Coupling(plant, rest, -(plant + rest) / nominal_inertia(sets))
 
 
 def coupling_force(dynamics: Dynamics, acceleration: np.ndarray, sets: dict) -> np.ndarray:
-    """Return H (m, 6 + n), for the true chi_ddot (m, 6 + n)."""
-    plant = dynamics.required(acceleration) - nominal_inertia(sets) * acceleration
-    limits = sets[NODE_OF["position"]]
-    plant[:, Z] -= limits.gravity_feedforward_mass * limits.gravity
-    return plant
+    """Return H with the known loads (m, 6 + n), for the true chi_ddot (m, 6 + n)."""
+    return dynamics.required(acceleration) - nominal_inertia(sets) * acceleration
 
 
 def nominal_inertia(sets: dict) -> np.ndarray:

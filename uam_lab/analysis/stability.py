@@ -126,13 +126,12 @@ def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> d
     """Return the RMS [N, N m] of the true coupling force and of each term against it, per axis.
 
     *_share: the part of the coupling that a term compensates, <term, H> / <H, H> over all axes;
-    unknown_rms, unknown_share: of what is not fed forward, and the adaptive term's part of it.
+    known_share: of H and the known loads, the loads' part.
     """
     plant = forces.plant[:, columns]
     met = {
         "adaptive": terms.adaptive[:, columns],
         "feedback": terms.feedback[:, columns],
-        "feedforward": terms.feedforward[:, columns],
         "integral": terms.integral[:, columns],
         "actuators": (terms.applied - terms.tau)[:, columns],
     }
@@ -140,9 +139,8 @@ def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> d
     for name, term in met.items():
         found[f"{name}_rms"] = rms(term)
         found[f"{name}_share"] = share(term, plant)
-    unknown = plant - terms.known[:, columns]
-    found["unknown_rms"] = rms(unknown)
-    found["unknown_share"] = share(met["adaptive"], unknown)
+    known = terms.known[:, columns]
+    found["known_share"] = share(known, plant + known)
     if columns == COLUMNS_OF["arm"]:  # the torque of its servos is not recorded
         found["actuators_rms"] = found["actuators_share"] = None
     return found

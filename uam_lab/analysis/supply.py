@@ -22,14 +22,13 @@ class Supply:
     """Terms of tau at m ticks, eq. (8a), tau_p; (18a), tau_q; (25a), tau_alpha.
 
     All (m, 6 + n): N, world (p), N m, FLU (q), N m (alpha).
-    tau = feedforward + feedback + adaptive + weight + integral.
+    tau = feedforward + feedback + adaptive + known + integral.
     """
 
-    feedforward: np.ndarray  # Mbar chi_d_ddot, drag, washout, the arm's known load; limits
+    feedforward: np.ndarray  # Mbar chi_d_ddot
     feedback: np.ndarray  # -Mbar Lambda xi
     adaptive: np.ndarray  # -Mbar dtau
-    weight: np.ndarray  # gravity_feedforward_mass g e3
-    known: np.ndarray  # of the feedforward, what is not Mbar chi_d_ddot
+    known: np.ndarray  # the weight, drag, washout, the arm's known load; limits
     integral: np.ndarray  # -Mbar times the integral action of position and arm
     tau: np.ndarray  # as recorded, after its limits
     applied: np.ndarray  # force and torque of the rotors; tau for the arm (no recorded torque)
@@ -41,27 +40,24 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     estimate: errors of the estimated state, the input of the law. sets: parameter sets by node.
     """
     shape = (len(rows), series.columns.size)
-    feedback, adaptive, weight, integral, planned = (np.zeros(shape) for _ in range(5))
+    feedforward, feedback, adaptive, integral = (np.zeros(shape) for _ in range(4))
     for name, columns in COLUMNS_OF.items():
         p = sets[NODE_OF[name]].record()[0]
         e, e_dot = estimate.e[:, columns], estimate.e_dot[:, columns]
         feedback[:, columns] = -p["inertia"] * (p["gain_e"] * e + p["gain_e_dot"] * e_dot)
-        planned[:, columns] = p["inertia"] * estimate.acceleration_d[:, columns]
+        feedforward[:, columns] = p["inertia"] * estimate.acceleration_d[:, columns]
         r = p["p12"] * e + p["p22"] * e_dot
         length = np.linalg.norm(r, axis=1)
         scale = series[f"adaptation.{name}.rho"][rows] / np.maximum(length, p["varpi"])
         adaptive[:, columns] = -p["inertia"] * (r * scale[:, None] + bias(series, name)[rows])
-    limits = sets["position_controller"]
-    weight[:, Z] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
     recorded = np.hstack(blocks)
     for name in ("position", "arm"):
         action = integral_action(series, sets[NODE_OF[name]], COLUMNS_OF[name])
         integral[:, COLUMNS_OF[name]] = action[rows]
-    feedforward = recorded - feedback - adaptive - weight - integral
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
-    known = feedforward - planned
-    return Supply(feedforward, feedback, adaptive, weight, known, integral, recorded, applied)
+    known = recorded - feedforward - feedback - adaptive - integral
+    return Supply(feedforward, feedback, adaptive, known, integral, recorded, applied)
 
 
 def bias(series: Series, subsystem: str) -> np.ndarray:

@@ -58,8 +58,7 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
 
 def _row(name: str, one: Mapping[str, Any]) -> dict[str, str]:
     value, shares = one["V"], one["coupling"]
-    met = (("adaptive_share", "adaptive"), ("unknown_share", "adaptive of what is unknown"),
-           ("feedback_share", "feedback"),
+    met = (("adaptive_share", "adaptive"), ("feedback_share", "feedback"),
            ("integral_share", "integral action"), ("actuators_share", "actuators"))  # fmt: skip
     terms = [f"{text} {_percent(shares[key], 0)}" for key, text in met if shares[key] is not None]
     return {
