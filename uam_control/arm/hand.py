@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import DOWN, hand_jacobian, hand_pose, hanging, last_link
@@ -199,6 +198,7 @@ def angles_for(
 
     position (3,) [m]: in the frame of a level base; the distance [m] is 0 where the arm reaches it.
     """
+    from scipy.optimize import least_squares  # the import takes a third of a second
 
     def miss(angles: np.ndarray) -> np.ndarray:
         return np.array(hand_pose(chain, angles, DOWN)[0]) - position

@@ -54,7 +54,7 @@ def add(commands: Subcommands) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compute, print and write the margins; return the exit status."""
     from uam_lab.experiments.margins import gains, report
-    from uam_lab.experiments.margins.cases import cases_of
+    from uam_lab.experiments.margins.cases import cases_of, smallest_delay
     from uam_lab.experiments.margins.pose_delay import pose_delay
     from uam_lab.experiments.margins.stack_model import MODELLED
     from uam_lab.records.rebuild import series_of
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"{profile.name} on {described.name}, hover, linear")
     say(report.table(cases))
     say(f"Poses may come {1e3 * left:.0f} ms later, then the estimate oscillates.")
-    computed = report.smallest_delay(cases)[0]
+    computed = smallest_delay(cases)[0]
     say(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
     say(f"results  {out}")
     return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE

@@ -31,9 +31,9 @@ from uam_lab.experiments.design.gains import (
     sections,
     thrust_response,
 )
+from uam_lab.experiments.margins.cases import Case
 from uam_lab.experiments.margins.linear import Margins
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, analyse, fastest_mode
-from uam_lab.experiments.margins.report import Case
 from uam_lab.experiments.margins.stack_model import Stack, stack_model
 from uam_sim_bridge.plant import Vehicle
 

@@ -7,21 +7,42 @@ limit of late setpoints is the profile's `delay_margin`, with less in the vehicl
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from uam_control.laws.modular import ZETA
 from uam_control.profiles.profile import Profile
 from uam_control.vehicle import CURRENT_SERVO
-from uam_lab.experiments.margins.loops import Analysis, analyse, fastest_mode
-from uam_lab.experiments.margins.report import Case
-from uam_lab.experiments.margins.stack_model import MODELLED, stack_model
+from uam_lab.experiments.margins.loops import Analysis, GrowingMode, analyse, fastest_mode
+from uam_lab.experiments.margins.stack_model import MODELLED, Stack, stack_model
 from uam_lab.records.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.plant import Vehicle
 
 INITIAL, FLOWN = "initial gains", "flown gains"
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to that of the vehicle
 LEAST_GAIN, MOST_PEAK = 3.0, 4.0  # [dB]; largest sensitivity
+
+
+@dataclass(frozen=True)
+class Case:
+    """One operating point.
+
+    label: payload and gains; rho: effective gain rho of each subsystem; sliding: the fastest mode
+    without dry friction of the joints.
+    """
+
+    label: str
+    stack: Stack
+    analysis: Analysis
+    rho: dict[str, float]
+    sliding: GrowingMode
+
+
+def smallest_delay(cases: Sequence[Case]) -> tuple[float, str]:
+    """Return the smallest delay margin [s] of the setpoint path, and the label of its case."""
+    worst = min(cases, key=lambda case: case.analysis.setpoint_delay)
+    return worst.analysis.setpoint_delay, worst.label
 
 
 def cases_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_lab.experiments.margins.cases import Case, smallest_delay
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, GrowingMode, step_response
-from uam_lab.experiments.margins.stack_model import Stack
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
 from uam_lab.records.results.templates import markdown_table
@@ -27,27 +27,6 @@ HEAD = ("loop", "crossover rad/s", "bandwidth Hz", "phase deg", "gain dB", "dela
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 # part of chi, length of the step plot [s], lowest and highest frequency of the Bode plot [rad/s]
 PANELS = ((POSITION, 4.0, 0.1, 100.0), (ATTITUDE, 1.0, 1.0, 600.0), (ARM, 0.6, 1.0, 600.0))
-
-
-@dataclass(frozen=True)
-class Case:
-    """One operating point.
-
-    label: payload and gains; rho: effective gain rho of each subsystem; sliding: the fastest mode
-    without dry friction of the joints.
-    """
-
-    label: str
-    stack: Stack
-    analysis: Analysis
-    rho: dict[str, float]
-    sliding: GrowingMode
-
-
-def smallest_delay(cases: Sequence[Case]) -> tuple[float, str]:
-    """Return the smallest delay margin [s] of the setpoint path, and the label of its case."""
-    worst = min(cases, key=lambda case: case.analysis.setpoint_delay)
-    return worst.analysis.setpoint_delay, worst.label
 
 
 def table(cases: Sequence[Case]) -> str:

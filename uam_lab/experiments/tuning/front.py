@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from optuna.trial import FrozenTrial
 
 from uam_control.profiles.profile import Profile
-from uam_lab.experiments.margins.cases import cases_of
-from uam_lab.experiments.margins.report import smallest_delay
 from uam_sim_bridge.plant import Vehicle
 
 PAYLOADS = (0.0, 0.2)  # [kg] on the magnet, of which the smaller margin counts
@@ -26,6 +24,9 @@ LEAST = 20  # evaluations without improvement from which on a search may be call
 
 def delay_margin(profile: Profile) -> float:
     """Return the delay margin [s] of the setpoint path; 0 if a loop is unstable (`uam margins`)."""
+    # the import takes a fifth of a second; `uam --help` skips it
+    from uam_lab.experiments.margins.cases import cases_of, smallest_delay
+
     cases = cases_of(profile, Vehicle.of(profile.vehicle), PAYLOADS)
     return smallest_delay(cases)[0] if all(case.analysis.stable for case in cases) else 0.0
 
