@@ -61,6 +61,33 @@ def test_a_plant_that_takes_most_of_the_torque_is_named(torque, left):
     assert note.startswith("standing_load: 0.") and left in note
 
 
+@pytest.mark.parametrize(
+    ("scenario", "profile", "effect", "named"),
+    [
+        ("ellipse_yaw", ["s500"], "standing_load", True),
+        ("hover", ["s500"], "standing_load", False),  # its heading is the same all the time
+        ("ellipse_yaw", ["s500", "indoors"], "standing_load", False),
+        ("ellipse_yaw", ["s500"], "standing_load:turning=0", False),
+    ],
+)
+def test_a_force_that_turns_with_a_heading_with_which_theta_hat_does_not(
+    scenario, profile, effect, named
+):
+    made = settings(scenario, engine="direct", profile=profile, effects=[effect])
+    assert [note for note in made.notes if note.endswith("--profile s500 --profile indoors")] == [
+        note for note in made.notes if note.startswith("standing_load: its force turns")
+    ]
+    assert named == any(note.startswith("standing_load: its force turns") for note in made.notes)
+
+
+@pytest.mark.parametrize(("limit", "rate"), [(6.0, 0.8), (0.5, 0.36)])
+def test_the_way_to_a_trajectory_turns_as_the_vehicle_can(limit, rate):
+    """90 % of the bridge's limit is the reference's; 0.8 of it: 0.36 of 0.5 rad/s."""
+    bridge = {"mavlink_bridge": {"rate_limit": [6.0, 6.0, limit]}}
+    made = settings("hover", engine="direct", parameters=bridge)
+    assert made.scenario_options.transit_yaw_rate == pytest.approx(rate)
+
+
 def test_a_battery_that_is_small_for_the_vehicle_is_named():
     """5 A h are the S-500's: 2.2 A h is less than half; its resistance grows to 0.005 2.2 / 5."""
     options = {"engine": "direct", "plant_preset": ["laboratory"]}

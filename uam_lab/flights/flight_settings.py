@@ -136,6 +136,7 @@ class FlightSettings:
         return tuple(name for name in self.without if name in REPLACEABLE)
 
 
+TRANSIT = 0.8  # of the largest yaw rate
 # names of settings that are the options as they are given
 AS_GIVEN = (
     *("controller", "engine", "clock", "imu", "plant", "autopilot", "px4_params", "sim_address"),
@@ -169,12 +170,12 @@ def checked(o: FlightOptions) -> FlightSettings:
         process_options.try_out(process)
     except ValueError as error:  # ParameterError too
         raise SettingsError(str(error)) from None
-    scenario_options = ScenarioOptions(o.end, o.transit_speed, o.transit_acceleration)
     vehicle = load_description(str(o.vehicle))
     changes = node_options.checked_changes(o.vehicle_changes, vehicle.numbers)
+    profile, own = _profile(o, vehicle, namespace)
+    scenario_options = _scenario_options(o, profile.sets["mission"].reference_yaw_rate)
     source = str(configuration.named("scenarios", str(o.scenario)))
     scenario = load_scenario(source, vehicle, scenario_options)
-    profile, own = _profile(o, vehicle, namespace)
     if profile.whole and (alone := [node for node in without if node in profile.laws()]):
         raise SettingsError(f"without {alone[0]}: {o.controller} is one law of all controllers")
     if o.autopilot == PX4 and profile.setpoint == WRENCH:
@@ -211,7 +212,7 @@ def checked(o: FlightOptions) -> FlightSettings:
         + _about_the_arm(vehicle, scenario, mass)
         + ((about,) if about else ())
         + clearance.notes(vehicle, scenario, mass)
-        + plant_fit.notes(profile, effects),
+        + plant_fit.notes(profile, effects, scenario),
         instance=_instance_of(link) if o.instance is None else o.instance,
         vehicle_changes=presets.added(changes, effects),
         without=tuple(dict.fromkeys(without if o.view else (*without, COCKPIT))),
@@ -225,6 +226,15 @@ def checked(o: FlightOptions) -> FlightSettings:
     )
     check_feasible(made, made.faults)
     return made
+
+
+def _scenario_options(o: FlightOptions, yaw_rate: float) -> ScenarioOptions:
+    """Return the options of the scenario; yaw_rate [rad/s]: the largest of a reference, of which
+    the way to a trajectory has at most TRANSIT."""
+    usual = ScenarioOptions(o.end, o.transit_speed, o.transit_acceleration)
+    least = ScenarioOptions.specs()["transit_yaw_rate"].low
+    slow = max(least, min(usual.transit_yaw_rate, TRANSIT * yaw_rate))
+    return replace(usual, transit_yaw_rate=slow)
 
 
 def _profile(

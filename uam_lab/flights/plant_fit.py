@@ -1,9 +1,16 @@
-"""Whether the effects of a plant fit the vehicle: their sizes are those of another one."""
+"""Whether the effects of a plant fit vehicle and profile: their sizes are those of another one."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
+import numpy as np
+
+from uam_control.control.output_limits import WORLD
+from uam_control.coordinates import CHI, YAW
+from uam_control.mission.motion.trajectory import reference_rows
+from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.profiles.profile import Profile
 from uam_sim_bridge.plant.effects.battery_sag import BatterySag
 from uam_sim_bridge.plant.effects.mismatches import RotorMismatch
@@ -11,13 +18,20 @@ from uam_sim_bridge.plant.effects.presets import Effects
 from uam_sim_bridge.plant.effects.standing_load import StandingLoad
 
 HALF = 0.5  # of the torque, of the battery, that a vehicle needs
+TURNED = math.radians(90.0)  # of the heading, beyond which what turns with it is another force
+STEP = 0.1  # [s] between two headings
 BATTERY = 5.0 / 2.2  # [A h/kg] of the S-500, for which config/plant/laboratory.yaml is
 
 
-def notes(profile: Profile, effects: Effects) -> tuple[str, ...]:
+def notes(profile: Profile, effects: Effects, scenario: Scenario) -> tuple[str, ...]:
     """Return notes about a standing torque that leaves the attitude law less than half of its own,
-    and about a battery of less than half of the S-500's capacity per mass."""
-    return (*_torque(profile, effects), *_battery(profile, effects))
+    a standing force that turns with a heading with which theta_hat does not turn, and a battery of
+    less than half of the S-500's capacity per mass."""
+    return (
+        *_torque(profile, effects),
+        *_force(profile, effects, scenario),
+        *_battery(profile, effects),
+    )
 
 
 def _torque(profile: Profile, effects: Effects) -> Iterator[str]:
@@ -33,6 +47,21 @@ def _torque(profile: Profile, effects: Effects) -> Iterator[str]:
                 f"{name}: {abs(torque):.3g} N m about {axis}, of {left:.3g} N m that "
                 f"{profile.vehicle.name} makes there; --effect {name}:torque=X/Y/Z"
             )
+
+
+def _force(profile: Profile, effects: Effects, scenario: Scenario) -> Iterator[str]:
+    load = effects.get(StandingLoad.NAME, {})
+    frame = getattr(profile.sets["position_controller"], "bias_frame", "")
+    if not any(load.get("force", ())) or not load.get("turning") or frame != WORLD:
+        return
+    begun, trajectory = scenario.from_origin()
+    times, joints = np.arange(0.0, begun.landing.end, STEP), len(profile.vehicle.joints)
+    if np.ptp(reference_rows(trajectory, times, joints)[CHI, :, YAW]) > TURNED:
+        profiles = " ".join(f"--profile {name}" for name in (*profile.name.split("+"), "indoors"))
+        yield (
+            f"{StandingLoad.NAME}: its force turns with the heading, which this path turns, but "
+            f"theta_hat of the profile does not: {profiles}"
+        )
 
 
 def _battery(profile: Profile, effects: Effects) -> Iterator[str]:
