@@ -180,6 +180,9 @@ def test_a_hand_that_heads_backward_is_on_its_task(tmp_path):
     heading = load_scenario("ee_circle_020", load_description()).route.path
     turned = motion.rows(np.array([9.0]), 1)[0, 0, 5] - heading.rows(np.array([9.0]), 1)[0, 0, 5]
     assert math.cos(turned) == pytest.approx(-1.0, abs=1e-3)
+    hold = load_scenario("ee_hold", vehicle).route.path
+    for rows in hold.rows(np.linspace(0.0, hold.length, 41), 3).swapaxes(0, 1):
+        np.testing.assert_allclose(hand_in_mujoco(vehicle, rows)[0], [0.0, 0.0, 0.9], atol=1e-4)
 
 
 def test_a_slower_task_is_solved_anew():
@@ -212,6 +215,17 @@ def test_an_arm_of_two_links_works_best_at_a_right_angle():
     # area of the velocities: link 1 x link 2 at a right angle
     assert np.prod(stretch(chain, np.array([0.2, math.pi / 2]))) == pytest.approx(0.1 * 0.14)
     assert reach(chain) == pytest.approx(0.1 + 0.14 + 0.03)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_an_arm_with_a_roll_joint_works_with_a_level_hinge(number):
+    """With an upright hinge the hand swings by any angle, and has no heading."""
+    chain = chain_of(load_description("s500_arm3"))
+    axes = np.array([[0.0, -1.0, 0.0]] * 3)
+    axes[number] = 1.0, 0.0, 0.0
+    end, rolls = np.full(3, 1.6), chain._replace(axes=axes)
+    angles = working_posture(rolls, (0.0, 0.3, 0.3), -end, end)
+    assert abs(angles[number]) < math.radians(5.0)  # the axis, along y at zero, rolls with it
 
 
 def test_a_hand_hangs_level_or_as_its_hinge_stands():

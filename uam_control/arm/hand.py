@@ -236,7 +236,8 @@ def working_posture(
     hinge: range [rad] of the hinge that the hand hangs on.
 
     That is the largest product of the singular values of its Jacobian (Yoshikawa's
-    manipulability), found joint by joint from `stowed` on.
+    manipulability) and of how level the tool's y axis and its hinge are: upright ones have no
+    heading, and let the hand swing by any angle. Found joint by joint from `stowed` on.
     """
     angles = np.clip(np.asarray(stowed, dtype=float), low, high)
     counted = freedom(chain)
@@ -267,4 +268,7 @@ def _manipulability(
     stands = float(hinge_angles(chain, angles[None])[0])
     if stands < hinge[0] or stands > hinge[1]:
         return -max(hinge[0] - stands, stands - hinge[1])
-    return float(np.prod(stretch(chain, angles)[:counted]))
+    level = math.cos(lean(hand_pose(chain, angles, DOWN)[1]))
+    if np.any(chain.swing_axis):
+        level *= math.hypot(*turned(last_link(chain, angles)[1], vector(chain.swing_axis))[:2])
+    return level * float(np.prod(stretch(chain, angles)[:counted]))

@@ -123,6 +123,8 @@ class HandSource:
         times = np.arange(self.base.knots[0], self.base.knots[-1], LOOKS)
         shoulders = self.base.rows(times, 1)[CHI, :, POSITION] + chain.offsets[0]
         away = np.linalg.norm(task[POSITION] - shoulders, axis=1).max()
+        if away < reach(chain):
+            return "; a smaller motion of the base, or another arm_deg, helps"
         return (
             f"; the arm reaches {reach(chain):.2f} m from its first joint, up to {away:.2f} m "
             "needed"
@@ -187,7 +189,9 @@ class _Reader:
         curve = joined([part.path for part in parts])
         above = np.zeros_like(middle)
         above[POSITION] = middle[POSITION] - (0.0, 0.0, 1.0)
-        above[POSITION] -= hands(self._flyer.chain, _at_origin(middle))[0, POSITION]
+        turned = _at_origin(middle)
+        turned[:, YAW] -= hands(self._flyer.chain, turned)[0, HEADING] - middle[YAW]
+        above[POSITION] -= hands(self._flyer.chain, turned)[0, POSITION]
         base = curve.shifted(0.0, above)
         still = np.zeros((len(curve.knots) - 1, 1, len(middle)))
         still[:, 0] = middle

@@ -93,7 +93,7 @@ def holding(task: Task, base: Polynomials, flyer: Flyer) -> Polynomials:
 
     def corrected(chi: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
         slopes = jacobians(flyer.chain, flown.chi, columns)[:, kept]
-        posture = _wanted(task, flown.times)[:, columns]
+        posture = _begun(task, flown.times, flyer)[:, columns]
         left = np.einsum("ijk,ik->ij", slopes, chi[:, columns] - posture)
         chi[:, columns] = posture + least_change(slopes, off[:, kept] + left)
 
@@ -113,12 +113,7 @@ def _solved(
     """
     for step in KNOTS:
         times = _grid(task.path, step / SAMPLES)
-        wanted = _wanted(task, times)
-        chi = wanted.copy()
-        chi[:, PITCH] = 0.0  # the task's elevation
-        level = _placed(chi)
-        level[:, YAW] = 0.0
-        chi[:, YAW] -= np.unwrap(hands(flyer.chain, level)[:, HEADING])
+        wanted, chi = _wanted(task, times), _begun(task, times, flyer)
         if base is None:
             chi[:, POSITION] -= hands(flyer.chain, _placed(chi))[:, POSITION]
         else:
@@ -153,6 +148,16 @@ def _grid(path: Polynomials, step: float) -> np.ndarray:
 def _wanted(task: Task, times: np.ndarray) -> np.ndarray:
     """Return the task (m, 6 + n) at times (m,) [s], at rest before it and after it."""
     return task.path.rows(times, 1)[CHI].copy()
+
+
+def _begun(task: Task, times: np.ndarray, flyer: Flyer) -> np.ndarray:
+    """Return chi (m, 6 + n) of level bases whose hand, in the posture, has the task's heading."""
+    chi = _wanted(task, times)
+    chi[:, PITCH] = 0.0  # the task's elevation
+    level = _placed(chi)
+    level[:, YAW] = 0.0
+    chi[:, YAW] -= np.unwrap(hands(flyer.chain, level)[:, HEADING])
+    return chi
 
 
 def _placed(chi: np.ndarray) -> np.ndarray:
