@@ -8,7 +8,7 @@ from quadrotor import INERTIA, MASS, Quadrotor
 
 from uam_control.frames import swap_body, swap_quaternion, swap_world
 from uam_control.maths.rotations import quaternion_multiply
-from uam_control.offboard.firmware import FIRMWARES
+from uam_control.offboard.firmware import FIRMWARES, PX4
 from uam_control.offboard.modes import FORCE, MavCmd, MavResult, Mode
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.targets import AttitudeTarget, WrenchTarget
@@ -19,6 +19,7 @@ from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, wrench_target
 
 OFFBOARD = (1.0, 6.0, 0.0)
+PX4_MODES = FIRMWARES[PX4]
 HOVER = MASS * 9.81 / (4 * 10.34)
 
 
@@ -235,6 +236,23 @@ def test_loss_of_the_stream_descends_level_and_disarms():
     assert "Disarmed by landing" in bench.texts()
     assert min(speeds) > -1.6
     assert min(speeds[250:]) > -1.0
+
+
+@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN])
+@pytest.mark.parametrize("strength", [0.85, 1.0])
+def test_rotors_weaker_than_told_do_not_make_a_landing_hard(mode, strength):
+    bench = airborne()
+    bench.body.mass /= strength  # as weaker rotors
+    bench.run(4.0, ((0, 0, 0), HOVER / strength))
+    assert abs(bench.body.velocity[2]) < 0.3
+    bench.autopilot._position_modes.home[:] = swap_world(bench.body.position)
+    assert bench.command(MavCmd.DO_SET_MODE, *PX4_MODES.mode_request(mode)) == MavResult.ACCEPTED
+    sinks = []
+    for _ in range(1000):
+        bench.tick()
+        sinks.append(-bench.body.velocity[2])
+    # MPC_LAND_SPEED; P 4, I 2: poles at 0.6 and 3.4 1/s, zero at 0.5 1/s, 7 % of overshoot
+    assert max(sinks) < 0.7 * 1.1 and sinks[-1] == pytest.approx(0.7, abs=0.02)
 
 
 def test_descent_without_vision_stays_level():

@@ -110,9 +110,32 @@ def test_an_internal_error_of_mujoco_ends_the_flight_not_the_process(effects):
         flight.plant.model.opt.integrator = 99
 
     flight.run(break_it)
-    assert flight.ended_by == "MuJoCo: mj_step: invalid integrator"
+    assert flight.ended_by == "the simulation cannot go on: MuJoCo: mj_step: invalid integrator"
     assert flight.recording.count > 200 and np.isfinite(flight.recording.values[200, 0])
     sound = MujocoPlant(Vehicle.load(), 0.0, seed=1)  # another plant of the process goes on
     sound.step(np.zeros(4), np.zeros(2), False)
     with pytest.raises(mujoco.FatalError, match="invalid integrator"):  # so does MuJoCo's own
         mujoco.mj_step(flight.plant.model, flight.plant.data)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_plant_that_becomes_unstable_ends_the_flight(compiled):
+    scenario = load_scenario("hover")
+    first = None
+    for _ in range(2):  # a second one in the same process as the first
+        flight = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), 0.0, seed=1)
+
+        def stiffen(time, phase, flight=flight):
+            if time > 1.5:  # a spring whose period the step of 2 ms does not follow
+                flight.plant.model.jnt_stiffness[flight.plant.model.joint("alpha_1").id] = 1e6
+
+        if not compiled:
+            flight.advance = lambda enough, most, flight=flight: flight.tick()
+        rows = flight.run(stiffen)
+        assert flight.ended_by.startswith("the simulation cannot go on: it is unstable; ")
+        assert "timestep below 0.002 s (MuJoCo: Nan" in flight.ended_by
+        assert "\n" not in flight.ended_by
+        heights = rows.series()["truth.z"]
+        assert rows.count < 1500 and heights[400] > 0.1  # in flight; none is of a fresh model
+        first = first or (rows.count, flight.ended_by)
+        assert (rows.count, flight.ended_by) == first

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import prepared
-from uam_control.maths.memory import Known, record
+from uam_control.maths.memory import Known, Number, record
 from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
 from uam_control.offboard.modes import (
     CUSTOM_MODE_ENABLED,
@@ -47,6 +47,7 @@ from uam_sim_bridge.autopilot.cycle import (
     control_tick,
     drive_motors,
     fly_rates,
+    learn_hover,
     take_vision,
 )
 from uam_sim_bridge.autopilot.landing import LandDetector
@@ -83,6 +84,7 @@ class Autopilot:
     """
 
     _time = Known()
+    _hover, _usual_hover = Number(), Number()  # thrust, see `learn_hover`
 
     def __init__(
         self,
@@ -110,7 +112,7 @@ class Autopilot:
         self._memory = np.zeros((7, 3))
         self.rates = self._memory[FILTERED]  # filtered body rates (3,) [rad/s, FRD]
         self._velocity = self.estimator.estimate[VELOCITY]
-        self.memory = record("", "time loss_time low_thrust")
+        self.memory = record("", "time loss_time low_thrust hover usual_hover")
         self._time = None
         self._flew_rates = False  # in the last cycle; no own mode of the autopilot did
         self.actuators = np.full(ACTUATORS, np.nan)  # set by DO_SET_ACTUATOR; NaN: disarmed value
@@ -245,6 +247,7 @@ class Autopilot:
         aided = self.estimator.predict(time, gyro, accel, dt)
         if landing.landed:
             self.estimator.stands(dt)
+            self._hover = self._usual_hover
         self.battery.update(time, commander.armed)
         commander.update(time, landing.landed, self.battery.state)
         setpoint = self._setpoint
@@ -268,8 +271,12 @@ class Autopilot:
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
-        if self._flew_rates and commander.armed and self._torque is not None:
-            self.allocate(self._torque, setpoint[3])
+        if self._flew_rates and commander.armed:
+            if self._torque is not None:
+                self.allocate(self._torque, setpoint[3])
+            if not landing.landed:
+                force = self.arrays.estimator.mean_force
+                learn_hover(self.memory, force, float(setpoint[3]), dt)
         if commander.stopped:
             self.motors[:] = 0.0
         velocity = self._velocity
@@ -321,7 +328,7 @@ class Autopilot:
             return np.zeros(4), False
         if mode in MODES and aided:
             modes = self._position_modes
-            setpoint = modes.update(mode, self.estimator.estimate, dt)
+            setpoint = modes.update(mode, self.estimator.estimate, dt, self._hover)
             if self.landing.landed and not modes.climbing:  # PX4 idles until it takes off
                 modes.reset()
                 setpoint[:] = 0.0
@@ -331,7 +338,7 @@ class Autopilot:
     def _descend(self, dt: float) -> np.ndarray:
         """Return the setpoint (4,) of the level descent."""
         known, contact = self._sink_known(self._time), self.landing.contact
-        return self._descent.update(self.estimator.estimate, dt, known, contact)
+        return self._descent.update(self.estimator.estimate, dt, known, contact, self._hover)
 
     def _sink_known(self, time: float) -> bool:
         return self.estimator.unaided_for(time) < self.parameters["EKF2_NOAID_TOUT"] * 1e-6
@@ -362,6 +369,7 @@ class Autopilot:
         )
         self._attitude_gains = attitude_gains(p)
         self.landing.configure(p)
+        self._usual_hover = float(p["MPC_THR_HOVER"])
         self.memory["loss_time"], self.memory["low_thrust"] = p["COM_OF_LOSS_T"], self.landing.low
         self.arrays = CycleArrays(
             *(self._loop, self.estimator.arrays, self._setpoint),

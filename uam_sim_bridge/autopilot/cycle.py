@@ -12,7 +12,7 @@ import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.setpoints.thrust_curve import inverse_curve
-from uam_sim_bridge.autopilot.autopilot_estimator import EstimatorArrays, fuse, predict
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, EstimatorArrays, fuse, predict
 from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
@@ -23,6 +23,8 @@ from uam_sim_bridge.autopilot.loops.rate_control import (
 )
 
 FARTHEST_VISION = 1e5  # m
+HOVER_TIME, HOVER_RANGE = 1.0, 0.2  # [s] of a mean; largest change (PX4: HTE_THR_RANGE)
+LEAST_LIFT = 0.3 * GRAVITY  # [m/s^2] specific force from which the thrust of hover is learned
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
@@ -93,13 +95,27 @@ def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
 class CycleArrays(NamedTuple):
     """What `fly_rates` uses. setpoint (4,): body rates [rad/s, FRD], thrust; commander (1,): its
     memory; numbers (1,): time [s] of the last cycle, NaN before the first; [s] without setpoints
-    and thrust beyond which a cycle is another one."""
+    and thrust beyond which a cycle is another one; estimated thrust of hover, its parameter."""
 
     loop: RateLoop
     estimator: EstimatorArrays
     setpoint: np.ndarray
     commander: np.ndarray
     numbers: np.ndarray
+
+
+@borrowing
+def learn_hover(numbers: np.ndarray, force: np.ndarray, thrust: float, dt: float) -> None:
+    """Estimate the thrust of hover from the present one and the mean specific force (3,) [m/s^2].
+
+    numbers: of `CycleArrays`; dt [s]. A weak battery or a payload changes it. PX4 does so by a
+    Kalman filter (MPC_USE_HTE).
+    """
+    m = numbers[0]
+    lift = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
+    hover = thrust * GRAVITY / max(LEAST_LIFT, lift)
+    m.hover += dt / HOVER_TIME * (hover - m.hover)
+    m.hover = min(m.usual_hover + HOVER_RANGE, max(m.usual_hover - HOVER_RANGE, m.hover))
 
 
 @borrowing
@@ -112,6 +128,7 @@ def fly_rates(a: CycleArrays, time: float, gyro: np.ndarray, accel: np.ndarray) 
     dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - m.time))
     m.time = commander.updated = time
     predict(gyro, accel, time, dt, a.estimator)
+    learn_hover(a.numbers, a.estimator.mean_force, a.setpoint[3], dt)
     control_tick(gyro, dt, True, False, a.setpoint, a.loop)
     return True
 

@@ -14,7 +14,7 @@ from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
-from uam_sim_bridge.plant.engine_step import error_text
+from uam_sim_bridge.plant.engine_step import failure
 from uam_sim_bridge.plant.gripper import Fingers
 from uam_sim_bridge.plant.magnet import NO_MAGNET, PayloadHinge, add_to, magnet_constants
 from uam_sim_bridge.plant.observation import (
@@ -331,7 +331,11 @@ class MujocoPlant(Plant):
         error = self._step(motor_commands, arm_command, magnet)
         self.effects.check()
         if error:
-            raise PhysicsError(f"MuJoCo: {error_text(error)}")
+            raise self.failure(error)
+
+    def failure(self, error: int) -> PhysicsError:
+        """Return what a step says that returned `error`."""
+        return failure(error, self.model)
 
     def disturb(self, disturbance: Disturbance) -> None:
         """See `Plant.disturb`."""

@@ -26,8 +26,17 @@ from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 
+BROKEN = "the simulation cannot go on"
+
+
 class PhysicsError(RuntimeError):
-    """The physics engine cannot go on; the text is one line. The plant must not be used again."""
+    """The physics engine cannot go on; the plant must not be used again.
+
+    The text is one line that begins with BROKEN.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"{BROKEN}: {why}")
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from uam_control.supervision import State
 from uam_lab.records.results.timeseries import Series
+from uam_sim_bridge.plant.plant import BROKEN
 
 COMPLETED, HELD, LANDED, FAILSAFE, LOST = "completed", "held", "landed", "failsafe", "lost"
 REFUSED = "refused"
@@ -20,7 +21,7 @@ OUTCOMES = {
     HELD: "in the air at the end, upright and at rest",
     LANDED: "the mission landed the vehicle softly, but was not completed",
     FAILSAFE: "the vehicle came down softly, but not by the mission's landing",
-    LOST: "any other end: a fall, a hard landing, or out of control",
+    LOST: "any other end: a fall, a hard landing, out of control, or an unstable plant",
 }
 
 
@@ -71,6 +72,8 @@ TOUCHED = "reached the ground in flight, while its reference was above it"
 
 def classify(series: Series, figures: Mapping[str, Any]) -> str:
     """Return one of OUTCOMES; figures: metrics.json of the flight."""
+    if (figures.get("abort_reason") or "").startswith(BROKEN):
+        return LOST  # what came after is not known
     if figures["mission_completed"]:  # except after a landing by the autopilot's failsafe
         return FAILSAFE if _down_early(series) else COMPLETED
     end = ending(series)

@@ -201,7 +201,7 @@ def measure(trial: Trial) -> TrialResult:
     series = outcome.series
     if trial.keep is not None:
         series.write(trial.keep)
-    figures = figures_of(trial, outcome, outcome.abort_reason)
+    figures = figures_of(trial, outcome, outcome.reason)
     flown, landing = series.flown, trial.load_scenario().landing
     end = classify(series, figures)
     return TrialResult(

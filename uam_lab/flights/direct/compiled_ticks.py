@@ -33,8 +33,7 @@ from uam_control.stages.signals import GRIP, IMU, JOINTS, NOTHING, PAYLOAD, POSE
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
 from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
-from uam_sim_bridge.plant import PhysicsError, Plant
-from uam_sim_bridge.plant.engine_step import error_text
+from uam_sim_bridge.plant import Plant
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.observation import sense, step
 from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, MocapArrays
@@ -279,7 +278,7 @@ class CompiledTicks:
         if end > 0 or place == 1:
             flight.cycle()
         elif self._fault[0]:
-            raise PhysicsError(f"MuJoCo: {error_text(self._fault.item(0))}")
+            raise flight.plant.physics.failure(self._fault.item(0))
         flight.push()
 
     def _run(self, count: int, whole: bool) -> tuple[int, int]:

@@ -161,13 +161,15 @@ class Descent:
         self._blind = 0.0  # s without a valid vertical velocity
 
     def update(
-        self, estimate: np.ndarray, dt: float, sink_known: bool, contact: bool
+        self, estimate: np.ndarray, dt: float, sink_known: bool, contact: bool, hover: float
     ) -> np.ndarray:
         """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
 
         estimate (10,): of `Estimator`; dt [s]; sink_known: its vertical velocity is valid; contact:
-        the ground is touched, and the vehicle only waits for the end of the flight, as in PX4.
+        the ground is touched, and the vehicle only waits for the end of the flight, as in PX4;
+        hover: thrust of hover, as estimated.
         """
+        self._gains[2] = hover
         if contact:
             self.reset()
             downward = GRAVITY

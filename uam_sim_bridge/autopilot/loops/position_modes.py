@@ -10,8 +10,9 @@ OFFBOARD:
 
 With MPC_ACC_DECOUPLE 1, the default, the vertical acceleration does not change the tilt. The
 integral stops vertically while the thrust saturates, and horizontally by tracking (arw_gain). PX4
-runs this loop at the rate of its estimate, some 100 Hz, and estimates the hover thrust
-(MPC_USE_HTE); here it runs at each sample, with MPC_THR_HOVER. All vectors are NED.
+runs this loop at the rate of its estimate, some 100 Hz, and estimates the hover thrust for it
+(MPC_USE_HTE), here for the other modes only; it runs at each sample, with MPC_THR_HOVER. All
+vectors are NED.
 """
 
 from __future__ import annotations
@@ -191,10 +192,10 @@ class PositionModes:
         """Clear the memory."""
         self._mode, self.sinking = None, False
 
-    def update(self, mode: Mode, estimate: np.ndarray, dt: float) -> np.ndarray:
+    def update(self, mode: Mode, estimate: np.ndarray, dt: float, hover: float) -> np.ndarray:
         """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
 
-        estimate (10,): of `Estimator`; dt [s].
+        estimate (10,): of `Estimator`; dt [s]; hover: thrust of hover, as estimated.
         """
         position, velocity = estimate[POSITION], estimate[VELOCITY]
         if mode is not self._mode:
@@ -206,7 +207,7 @@ class PositionModes:
         self._integral += self._integral_gain * error * dt
         np.clip(self._integral, -_INTEGRAL, _INTEGRAL, out=self._integral)
         acceleration = self._velocity_gain * error + self._integral
-        return self._attitude(estimate, acceleration)
+        return self._attitude(estimate, acceleration, hover)
 
     def _desired_velocity(self, mode: Mode, position: np.ndarray, dt: float) -> np.ndarray:
         """Return the desired velocity (3,) [m/s, NED]; moves the held position."""
@@ -239,7 +240,9 @@ class PositionModes:
         back[2] = min(p["MPC_LAND_SPEED"], max(-p["MPC_LAND_SPEED"], back[2]))
         return np.where(fixed, back, moving) + vertical
 
-    def _attitude(self, estimate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    def _attitude(
+        self, estimate: np.ndarray, acceleration: np.ndarray, hover: float
+    ) -> np.ndarray:
         """Return the setpoint (4,) for an acceleration (3,) [m/s^2, NED]."""
         p = self._parameters
         lift = max(_LEAST_LIFT, GRAVITY - acceleration[2])
@@ -254,6 +257,6 @@ class PositionModes:
         size = math.sqrt(forward**2 + right**2 + lift**2)
         desired = quaternion_from_euler(np.array([roll, pitch, self._yaw]))
         attitude_rates(estimate[ATTITUDE], desired, 0.0, self._attitude_gains, self.setpoint)
-        thrust = p["MPC_THR_HOVER"] * size / GRAVITY
+        thrust = hover * size / GRAVITY
         self.setpoint[3] = min(p["MPC_THR_MAX"], max(p["MPC_THR_MIN"], thrust))
         return self.setpoint
