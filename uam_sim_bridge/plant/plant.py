@@ -25,7 +25,6 @@ from uam_control.coordinates import ALPHA
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.plant.vehicle import Vehicle
 
-
 BROKEN = "the simulation cannot go on"
 
 

@@ -240,9 +240,7 @@ class PositionModes:
         back[2] = min(p["MPC_LAND_SPEED"], max(-p["MPC_LAND_SPEED"], back[2]))
         return np.where(fixed, back, moving) + vertical
 
-    def _attitude(
-        self, estimate: np.ndarray, acceleration: np.ndarray, hover: float
-    ) -> np.ndarray:
+    def _attitude(self, estimate: np.ndarray, acceleration: np.ndarray, hover: float) -> np.ndarray:
         """Return the setpoint (4,) for an acceleration (3,) [m/s^2, NED]."""
         p = self._parameters
         lift = max(_LEAST_LIFT, GRAVITY - acceleration[2])
