@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import Phase, example, given, settings
@@ -12,7 +14,7 @@ from uam_control.mission.guidance import Guidance
 from uam_control.mission.motion.path_clock import PathClock
 from uam_control.mission.motion.segments import Segment
 from uam_control.mission.motion.trajectory import empty_motion
-from uam_control.mission.payload_watch import Shift
+from uam_control.mission.payload_watch import PayloadWatch, Shift
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 DT = 0.01
@@ -381,3 +383,28 @@ def test_the_preview_is_the_planned_path_up_to_a_length():
     guide.descend(119.99, guide.motion[:3], 0.28, stow=False)
     stamps, chi = guide.preview(119.99, 0.25, 2.0)
     assert stamps[-1] - stamps[0] == pytest.approx(2.0) and chi[-1, 2] < chi[0, 2]
+
+
+def test_the_way_clear_of_a_stand_stays_within_the_geofence_and_off_other_stands():
+    guide = guidance()
+
+    def way(x, *stands, high=(5.0, 5.0, 6.0)):
+        raised = [{"kind": "stand", "position": (*place, 0.0)} for place in stands]
+        scenario = replace(load_scenario("hover"), environment=raised)
+        parameters = MissionParameters(clear_distance=0.7, clear_height=0.2, geofence_high=high)
+        watch = PayloadWatch(scenario, guide, parameters)
+        return watch.clear(np.array([x, 0.0, 1.0, *np.zeros(5)]))
+
+    stand, half = (1.0, 0.0), 0.7 * np.sqrt(0.75)
+    assert not way(1.8, stand).any() and not way(1.8).any()
+    np.testing.assert_allclose(way(1.2, stand), [0.5, 0.0, 0.2], atol=1e-12)
+    np.testing.assert_allclose(way(1.0, stand), [0.7, 0.0, 0.2], atol=1e-12)  # above it
+    # 30 degrees lead to x = 1.61, 60 degrees to 1 + 0.7 / 2
+    fence = (1.5, 5.0, 1.1)
+    np.testing.assert_allclose(way(1.2, stand, high=fence), [0.15, half, 0.1], atol=1e-12)
+    other = (1.35, 0.9)
+    np.testing.assert_allclose(way(1.2, stand, other, high=fence), [0.15, -half, 0.1], atol=1e-12)
+    # 0.73 m from the other stand after 30 degrees, 0.55 m straight on
+    np.testing.assert_allclose(
+        way(1.2, stand, (2.25, 0.0)), [0.7 * np.sqrt(0.75) - 0.2, 0.35, 0.2], atol=1e-12
+    )

@@ -32,6 +32,7 @@ from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.supervision import Readings
 
 ABOVE = 0.5  # of clear_distance: nearer to a stand, a vehicle that descends level meets it
+TURNS = (0.0, *(s * math.radians(a) for a in (30.0, 60.0, 90.0) for s in (1.0, -1.0)))  # of a way
 RAISED = "stand", "table", "shelf", "box"  # of the environment: not to be landed on
 SPEED = 0.05  # [m/s] peak speed of a change
 SHORTEST = 1.0  # [s] of a change
@@ -246,15 +247,33 @@ class PayloadWatch:
         return any(math.hypot(*(chi[:Z] - stand)) < near for stand in self._stands)
 
     def clear(self, chi: np.ndarray) -> np.ndarray:
-        """Return the way (3,) [m] from chi (6 + n,) up and away from a stand nearby, else zeros."""
-        p, way = self._parameters, np.zeros(3)
-        for stand in self._stands:
-            beside = chi[:Z] - stand
-            distance = max(math.hypot(*beside), 1e-6)
-            if distance < p.clear_distance:
-                way[:Z] = (p.clear_distance / distance - 1.0) * beside
-                way[Z] = p.clear_height
+        """Return the way (3,) [m] from chi (6 + n,) up and away from a stand nearby, else zeros.
+
+        Straight away from the nearest stand; to a side where that leaves the geofence, or comes
+        near another stand.
+        """
+        p, way, here = self._parameters, np.zeros(3), chi[:Z]
+        stand = min(self._stands, key=lambda one: math.dist(here, one), default=None)
+        if stand is None or math.dist(here, stand) >= p.clear_distance:
+            return way
+        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
+        straight = math.atan2(*(here - stand)[::-1])
+
+        def badness(turn: float) -> tuple[float, float]:
+            place = stand + p.clear_distance * _along(straight + turn)
+            beyond = np.maximum(low[:Z] - place, place - high[:Z]).max()
+            near = min(math.dist(place, one) for one in self._stands)
+            return max(0.0, beyond), round(max(0.0, p.clear_distance - near), 2)
+
+        turn = min(TURNS, key=badness)
+        way[:Z] = stand + p.clear_distance * _along(straight + turn) - here
+        way[Z] = min(p.clear_height, max(0.0, high[Z] - chi[Z]))
         return way
+
+
+def _along(angle: float) -> np.ndarray:
+    """Return the unit vector (2,) at an angle [rad] from x."""
+    return np.array([math.cos(angle), math.sin(angle)])
 
 
 def _raised(environment: Iterable[Mapping[str, Any]]) -> list[np.ndarray]:
