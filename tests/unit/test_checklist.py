@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import ConfirmStep, KillStep, MagnetStep, guided
@@ -21,7 +22,6 @@ from uam_lab.preflight.checklist.observation import (
     Host,
     NodeReport,
     Observation,
-    PreArmLine,
     Resting,
     Sample,
     Stream,
@@ -72,7 +72,7 @@ def good(**changes):
         parameters_read=True,
         fence=Box((-2.0, -2.0, 0.0), (2.0, 2.0, 2.5)),
         room=Box((-2.0, -2.0, 0.0), (2.0, 2.0, 2.5)),
-        preflight=(PreArmLine("mocap", "0.01 s", "at most 0.1 s", True),),
+        preflight=(PreflightCheck("mocap", "0.01 s", "at most 0.1 s", True),),
         host=Host(5e10, True, 0.0, ("performance",) * 4, 99.0),
     )
     for name, value in changes.items():
@@ -133,7 +133,7 @@ def hot(name, value):
         ({"host": Host(5e10, True, 0.0, ("powersave",))}, "CPU governor", "powersave"),
         ({"preflight": ()}, "pre-arm report", "unknown"),
         (
-            {"preflight": (PreArmLine("speed", "1 m/s", "at most 0.3 m/s", False),)},
+            {"preflight": (PreflightCheck("speed", "1 m/s", "at most 0.3 m/s", False),)},
             "pre-arm report",
             "speed: 1 m/s (at most 0.3 m/s)",
         ),
@@ -162,7 +162,9 @@ def test_a_vehicle_without_arm_driver_has_no_servo_items():
 
 
 def test_the_own_line_of_the_pre_arm_report_does_not_count():
-    assert not failed(good(preflight=(*good().preflight, PreArmLine("checklist", "", "", False))))
+    assert not failed(
+        good(preflight=(*good().preflight, PreflightCheck("checklist", "", "", False)))
+    )
 
 
 def test_what_is_not_wanted_is_left_out():
@@ -228,7 +230,7 @@ def confirmed_steps():
 
 def test_the_order_of_the_list_and_the_permission():
     checklist = Checklist(confirmed_steps())
-    assert not checklist.passed and checklist.failing[0] == "automatic items: not judged yet"
+    assert not checklist.passed and checklist.failing_names[0] == "automatic items"
     checklist.update(Situation(1.0), FAILING, armed=False)
     assert checklist.step is None
     assert checklist.confirm() == (

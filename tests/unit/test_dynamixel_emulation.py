@@ -26,7 +26,7 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     ServoLine,
 )
 from uam_sim_bridge.devices.dynamixel.health import (
-    ERROR_BITS,
+    ERRORS,
     advice,
     hardware_errors,
 )
@@ -223,9 +223,9 @@ def test_an_error_outside_the_shutdown_register_leaves_the_torque(bus, line):
     assert line.servos[0].shaft.last.on
 
 
-@given(st.sets(st.sampled_from(list(ERROR_BITS))))
+@given(st.sets(st.sampled_from(list(ERRORS))))
 def test_errors_in_words(errors):
-    status = sum(1 << ERROR_BITS[one] for one in errors)
+    status = sum(1 << ERRORS[one][0] for one in errors)
     assert set(hardware_errors(status)) == errors
     assert all(one in advice(status) for one in errors)
 

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from uam_control.stamps import SECOND
+from uam_control.supervision import PreflightCheck
 from uam_control.vehicle import VehicleDescription
 from uam_lab.preflight.checklist.host import HostReader
 from uam_lab.preflight.checklist.limits import ChecklistParameters
@@ -22,7 +23,6 @@ from uam_lab.preflight.checklist.observation import (
     GyroIntegral,
     NodeReport,
     Observation,
-    PreArmLine,
     Resting,
     Sample,
     Stream,
@@ -210,7 +210,9 @@ class Feed:
         self._magnet = bool(message.data)
 
     def _on_preflight(self, message: Any) -> None:
-        self.observation.preflight = tuple(PreArmLine(*line) for line in read_preflight(message))
+        self.observation.preflight = tuple(
+            PreflightCheck(*line) for line in read_preflight(message)
+        )
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:

@@ -43,7 +43,9 @@ class RoomBody:
         back = conjugate(c.world)
         pivot = matrix_from_quaternion(quaternion) @ np.array(c.pivot)
         at = matrix_from_quaternion(back) @ (position + np.array(c.origin) + pivot)
-        turned = quaternion_multiply(back, quaternion_multiply(quaternion, _inverse(c.body)))
+        turned = quaternion_multiply(
+            back, quaternion_multiply(quaternion, conjugate(np.array(c.body)))
+        )
         if self.turn:
             made = quaternion_from_euler(np.array([0.0, 0.0, self.turn]))
             made = quaternion_multiply(back, quaternion_multiply(made, c.world))
@@ -53,7 +55,3 @@ class RoomBody:
             at = matrix_from_quaternion(other) @ at
             turned = quaternion_multiply(other, quaternion_multiply(turned, conjugate(other)))
         return tuple(at.tolist()), (*turned[1:].tolist(), float(turned[0]))
-
-
-def _inverse(quaternion: tuple[float, ...]) -> np.ndarray:
-    return conjugate(np.array(quaternion))

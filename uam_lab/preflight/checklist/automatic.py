@@ -187,7 +187,7 @@ def recording(seen: Observation) -> Finding:
 def pre_arm(seen: Observation) -> Finding:
     """The mission's own pre-arm report is green."""
     lines = [line for line in seen.preflight if line.name != OWN_LINE]
-    failed = [f"{line.name}: {line.value} ({line.limit})" for line in lines if not line.passed]
+    failed = [line.text for line in lines if not line.passed]
     value = "; ".join(failed) or ("green" if lines else UNKNOWN)
     return Finding("pre-arm report", value, "green", bool(lines) and not failed, True)
 

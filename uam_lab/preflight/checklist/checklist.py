@@ -17,7 +17,6 @@ from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.step import Finding, Situation, Step, StepState
 
 AUTOMATIC, GUIDED = "automatic", "guided"
-NOT_YET = "not judged yet"
 
 
 @dataclass(frozen=True)
@@ -53,22 +52,6 @@ class Checklist:
         )
 
     @property
-    def in_hands(self) -> bool:
-        """Return whether a person handles the vehicle."""
-        return self.step is not None
-
-    @property
-    def failing(self) -> list[str]:
-        """Return one line per item that has not passed."""
-        found = [one.text for one in self.findings if not one.passed]
-        if not self.findings:
-            found.append(f"automatic items: {NOT_YET}")
-        for one in self.steps:
-            if one.state is not StepState.PASSED:
-                found.append(f"{one.name}: {one.value or one.state.value}")
-        return found
-
-    @property
     def failing_names(self) -> list[str]:
         """Return the names of the items that have not passed."""
         found = [one.name for one in self.findings if not one.passed]
@@ -96,7 +79,7 @@ class Checklist:
                 self._begin_next(now.time)
 
     def _take(self, findings: tuple[Finding, ...]) -> None:
-        if self.in_hands:
+        if self.step is not None:  # the vehicle is in the hands of a person
             before = {one.name: one for one in self.findings}
             findings = tuple(before.get(one.name, one) if one.standing else one for one in findings)
         self.findings = findings

@@ -16,6 +16,7 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
+from uam_control.supervision import PreflightCheck
 
 SPAN = 2.0  # [s] of stamps that are kept
 FEWEST = 5  # stamps
@@ -182,15 +183,6 @@ class Box(NamedTuple):
     high: Sequence[float]
 
 
-class PreArmLine(NamedTuple):
-    """A line of the mission's pre-arm report."""
-
-    name: str
-    value: str
-    limit: str
-    passed: bool
-
-
 @dataclass(frozen=True)
 class Host:
     """The companion computer. None: not known.
@@ -274,5 +266,5 @@ class Observation:
     parameters_read: bool | None = None
     fence: Box | None = None
     room: Box | None = None
-    preflight: tuple[PreArmLine, ...] = ()
+    preflight: tuple[PreflightCheck, ...] = ()
     host: Host = Host()

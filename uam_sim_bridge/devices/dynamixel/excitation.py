@@ -119,42 +119,32 @@ def excite(
     waits until the next cycle and returns the time [s]. Raises Aborted; the driver is stopped
     then, and otherwise left running.
     """
+    p = parameters
     try:
-        return _run(driver, joint, centre, weight, parameters, pace)
+        first = _first_reading(driver, pace)
+        hold, motion = first.position.copy(), Excitation(first.position[joint], centre, p)
+        rows, reading, desired_rate = [], first, np.zeros(len(hold))
+        started = pace()
+        while (time := pace() - started) < motion.total:
+            desired = hold.copy()
+            desired[joint], desired_rate[joint] = motion.at(time)
+            error = desired - reading.position
+            effort = weight(reading.position[joint]) + p.stiffness * error
+            effort += p.damping * (desired_rate - reading.velocity)
+            driver.command_effort(np.clip(effort, -p.effort_max, p.effort_max))
+            reading = driver.cycle() or reading
+            _check(driver, reading, error, p)
+            if motion.begin <= time < motion.end and (not rows or reading is not rows[-1]):
+                rows.append(reading)
+        return Record(
+            np.array([row.time for row in rows]),
+            np.array([row.position for row in rows]),
+            np.array([row.velocity for row in rows]),
+            np.array([row.effort for row in rows]),
+        )
     except BaseException:
         driver.stop()
         raise
-
-
-def _run(
-    driver: ArmDriver,
-    joint: int,
-    centre: float,
-    weight: Callable[[float], np.ndarray],
-    p: ExcitationParameters,
-    pace: Callable[[], float],
-) -> Record:
-    first = _first_reading(driver, pace)
-    hold, motion = first.position.copy(), Excitation(first.position[joint], centre, p)
-    rows, reading, desired_rate = [], first, np.zeros(len(hold))
-    started = pace()
-    while (time := pace() - started) < motion.total:
-        desired = hold.copy()
-        desired[joint], desired_rate[joint] = motion.at(time)
-        error = desired - reading.position
-        effort = weight(reading.position[joint]) + p.stiffness * error
-        effort += p.damping * (desired_rate - reading.velocity)
-        driver.command_effort(np.clip(effort, -p.effort_max, p.effort_max))
-        reading = driver.cycle() or reading
-        _check(driver, reading, error, p)
-        if motion.begin <= time < motion.end and (not rows or reading is not rows[-1]):
-            rows.append(reading)
-    return Record(
-        np.array([row.time for row in rows]),
-        np.array([row.position for row in rows]),
-        np.array([row.velocity for row in rows]),
-        np.array([row.effort for row in rows]),
-    )
 
 
 def _first_reading(driver: ArmDriver, pace: Callable[[], float]) -> Reading:

@@ -141,10 +141,6 @@ class PacketReader:
         self.damaged += 1
         self._bytes = self._bytes[len(HEADER) :]
 
-    def clear(self) -> None:
-        """Forget an incomplete packet."""
-        self._bytes = b""
-
 
 def _framed(servo: int, body: bytes) -> bytes:
     packet = HEADER + bytes([servo]) + (len(body) + 2).to_bytes(2, "little") + body

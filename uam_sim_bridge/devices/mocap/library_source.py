@@ -77,14 +77,10 @@ class LibrarySource:
         data = process.stdout.read1(1 << 16)
         if not data:
             self.failure = _last_line(process.stderr.read())
-            self._end()
+            self.close()
             return []
         *lines, self._rest = (self._rest + data).split(b"\n")
         return [frame for line in lines if (frame := self._frame(line)) is not None]
-
-    def close(self) -> None:
-        """End the process."""
-        self._end()
 
     def _running(self) -> subprocess.Popen | None:
         now = time.monotonic()
@@ -108,7 +104,8 @@ class LibrarySource:
         self._seen |= dict.fromkeys(poses)
         return Frame(arrival, None, None, None, dict.fromkeys(self._seen) | poses)
 
-    def _end(self) -> None:
+    def close(self) -> None:
+        """End the process."""
         process, self._process = self._process, None
         if process is None:
             return

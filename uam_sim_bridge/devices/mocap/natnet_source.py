@@ -233,9 +233,7 @@ def _receive(source: socket.socket) -> tuple[bytes, str, int] | None:
     """Return a datagram, the address of its sender and its arrival [ns]; None if there is none."""
     try:
         data, extra, _, sender = source.recvmsg(LARGEST, socket.CMSG_SPACE(_STAMP.size))
-    except BlockingIOError:
-        return None
-    except OSError:  # a refused port of the server: its computer is there, Motive is not
+    except OSError:  # nothing, or a refused port of the server: no Motive on its computer
         return None
     arrival = time.time_ns()
     for level, kind, content in extra:

@@ -18,7 +18,7 @@ from uam_sim_bridge.devices.dynamixel.control_table import (
     control_table,
 )
 from uam_sim_bridge.devices.dynamixel.emulated.shafts import Drive, Shaft
-from uam_sim_bridge.devices.dynamixel.health import ERROR_BITS
+from uam_sim_bridge.devices.dynamixel.health import ERRORS
 from uam_sim_bridge.devices.servo_bus import Register, word
 
 READ_ONLY = (
@@ -50,7 +50,6 @@ RANGES = {
     names.STATUS_LEVEL: (0, 2),
     names.CURRENT_LIMIT: (0, 1193),
 }
-MODES = (0, 1, 3, 4, 5, 16)
 
 
 class EmulatedServo:
@@ -113,8 +112,8 @@ class EmulatedServo:
         self._memory[at.address : at.end] = word(value, at.size)
 
     def raise_error(self, error: str) -> None:
-        """Set a hardware error, of ERROR_BITS; the shutdown register decides on the torque."""
-        bit = 1 << ERROR_BITS[error]
+        """Set a hardware error, of ERRORS; the shutdown register decides on the torque."""
+        bit = 1 << ERRORS[error][0]
         self.set(names.HARDWARE_ERROR, self.get(names.HARDWARE_ERROR) | bit)
         if bit & self.get(names.SHUTDOWN):
             self._shut_down = True
@@ -201,7 +200,9 @@ class EmulatedServo:
             if name == names.TORQUE_ENABLE and value and self._shut_down:
                 return protocol.RESULT_FAIL
             low, high = RANGES.get(name, (0, math.inf))
-            if not low <= value <= high or (name == names.OPERATING_MODE and value not in MODES):
+            if not low <= value <= high or (
+                name == names.OPERATING_MODE and value not in names.MODE_NAMES
+            ):
                 return protocol.DATA_RANGE
             size = abs(int.from_bytes(at.of(data, address), "little", signed=True))
             if name in LIMITED and size > self.get(LIMITED[name]):
