@@ -68,7 +68,9 @@ def one(options: argparse.Namespace) -> int:
             out, show, video=not options.no_video, pictures=pictures, ulog=options.ulog
         )
     console.print(summary(metrics, out))
-    for note in [*_notes(out), report.problem]:
+    info = out / "info.json"
+    notes = read_json(info).get("notes") if info.exists() else None
+    for note in [*(notes or ()), report.problem]:
         if note:
             say(f"note: {note}")
     return WRITTEN
@@ -91,8 +93,3 @@ def several(options: argparse.Namespace) -> int:
         page = build_overlay(flights, out, show)
     say(f"report: {page}")
     return WRITTEN
-
-
-def _notes(directory: Path) -> list[str]:
-    file = directory / "info.json"
-    return read_json(file).get("notes") or [] if file.exists() else []

@@ -50,7 +50,8 @@ class FrameRate:
         used share of all processor time since the last call, 0..1.
         """
         self._fastest, self._slowest, self._clock = fastest, slowest, clock
-        self._own, self._machine = own or _process_time, machine or _machine_load
+        self._own = own or _process_time
+        self._machine = machine or (lambda: psutil.cpu_percent() / 100.0)
         self._machine()
         self._last = clock(), self._own()
         self.period = fastest  # [s]
@@ -83,10 +84,6 @@ class FrameRate:
 def _process_time() -> float:
     times = psutil.Process().cpu_times()
     return times.user + times.system
-
-
-def _machine_load() -> float:
-    return psutil.cpu_percent() / 100.0
 
 
 @dataclass(frozen=True)

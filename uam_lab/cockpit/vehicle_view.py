@@ -59,8 +59,10 @@ def _of_link(link: ElementTree.Element) -> Iterator[Shape]:
         ):
             geometry = visual.find(f"geometry/{kind}")
             if geometry is not None:
+                said = visual.find("material/color")
+                colour = GREY if said is None else tuple(_numbers(said.get("rgba"), 4).tolist())
                 size = np.concatenate([_numbers(geometry.get(name), 0) for name in names])
-                yield Shape(link.get("name", ""), kind, size, *_place(visual), _colour(visual))
+                yield Shape(link.get("name", ""), kind, size, *_place(visual), colour)
 
 
 def _place(visual: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
@@ -68,11 +70,6 @@ def _place(visual: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
     place = {} if origin is None else origin.attrib
     turn = quaternion_from_euler(_numbers(place.get("rpy"), 3))
     return _numbers(place.get("xyz"), 3), turn
-
-
-def _colour(visual: ElementTree.Element) -> tuple[float, ...]:
-    colour = visual.find("material/color")
-    return GREY if colour is None else tuple(_numbers(colour.get("rgba"), 4).tolist())
 
 
 def _numbers(text: str | None, count: int) -> np.ndarray:

@@ -54,7 +54,9 @@ class Progress(Observer):
             shown = before is not None and before.present == one.present
             same = shown and (one.present or gist(before.text) == gist(one.text))
             if one.text != STARTING and not same:
-                self.message(in_a_line(one))
+                check = "" if one.present else f"; check: {one.advice}"
+                state = "present" if one.present else "missing"
+                self.message(f"{one.name}: {state}: {one.text}{check}")
 
     def update(self, status: FlightStatus) -> None:
         """Show the newest status."""
@@ -129,13 +131,6 @@ class Progress(Observer):
 def gist(text: str) -> str:
     """Return the text without its numbers, of which some grow: ages, counts."""
     return re.sub(r"\d+", "", text)
-
-
-def in_a_line(device: DeviceState) -> str:
-    """Return the state of a device, and how to check an absent one."""
-    if device.present:
-        return f"{device.name}: present: {device.text}"
-    return f"{device.name}: missing: {device.text}; check: {device.advice}"
 
 
 def device_table(devices: Iterable[DeviceState]) -> Table:

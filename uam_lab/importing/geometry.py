@@ -150,8 +150,9 @@ def set_angles(parts: Parts, angles: np.ndarray) -> None:
 def holding_torques(parts: Parts, load: float, gravity: float) -> np.ndarray:
     """Return the largest torque (n,) [N m] that holds each joint of a level base, load [kg] at the
     tip: the far links outstretched at right angles to gravity."""
-    data = parts.data
-    ends = np.array([data.xanchor[j] for j in parts.joints] + [_tip_in_world(parts)])
+    origin, axes = parts.frame(len(parts.joints))
+    anchors = [parts.data.xanchor[j] for j in parts.joints]
+    ends = np.array([*anchors, origin + axes @ tip(parts)[0]])
     lengths = np.linalg.norm(np.diff(ends, axis=0), axis=1)
     found = []
     for i in range(len(parts.joints)):
@@ -162,11 +163,6 @@ def holding_torques(parts: Parts, load: float, gravity: float) -> np.ndarray:
             before += lengths[k]
         found.append(gravity * (moment + load * before))
     return np.array(found)
-
-
-def _tip_in_world(parts: Parts) -> np.ndarray:
-    origin, axes = parts.frame(len(parts.joints))
-    return origin + axes @ tip(parts)[0]
 
 
 def pose_of(parts: Parts, geom: int) -> tuple[np.ndarray, np.ndarray]:

@@ -44,7 +44,7 @@ def read(file: Path, root: XmlElement) -> Source:
             source.meshes[name] = found
     for joint in spec.joints:
         if np.any(np.asarray(joint.stiffness) > 0.0):
-            where = lines.get(("joint", joint.name), str(file))
+            where = source.where("joint", joint.name)
             source.notes.append(f"joint {joint.name}: its spring is left out ({where})")
     _actuators(source)
     _remove_the_rest(spec)
@@ -75,7 +75,7 @@ def _note_lines(file: Path, root: XmlElement, folder: Path, lines: dict, depth: 
 
 def _leave_out(source: Source, name: str, file: Path) -> None:
     """Remove the shapes of a missing mesh; refuse one that may have a mass."""
-    where = source.lines.get(("mesh", name), str(source.file))
+    where = source.where("mesh", name)
     for geom in list(source.spec.geoms):
         if geom.meshname == name:
             counts = geom.mass != 0.0 and not geom.parent.explicitinertial

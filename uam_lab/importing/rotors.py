@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from uam_control.vehicle.rotor_geometry import effectiveness
-from uam_lab.importing.source import RotorFacts, Source, place
+from uam_lab.importing.source import RotorFacts, Source
 
 NAMES = (r"rotor", r"prop(eller)?(?!rio)", r"motor|thrust")
 ANY = re.compile("|".join(NAMES), re.I)
@@ -66,12 +66,13 @@ def find_rotors(
     """
     origin, axes = data.xpos[base], data.xmat[base].reshape(3, 3)
 
-    def rotor(name: str, place_: np.ndarray, matrix: np.ndarray, body: int) -> FoundRotor:
-        facts = source.rotors.get(name) or _of_body(source, model, body)
+    def rotor(name: str, place: np.ndarray, matrix: np.ndarray, body: int) -> FoundRotor:
+        known = (source.rotors[one] for one in (name, *_names(model, body)) if one in source.rotors)
+        facts = next(known, None)
         return FoundRotor(
             name=name,
-            where=place(source.file, source.lines, "body", model.body(body).name),
-            position=axes.T @ (place_ - origin),
+            where=source.where("body", model.body(body).name),
+            position=axes.T @ (place - origin),
             axis=axes.T @ matrix.reshape(3, 3)[:, 2],
             radius=_radius(model, data, body) if body != base else 0.0,
             facts=replace(facts) if facts else RotorFacts(),
@@ -88,7 +89,11 @@ def find_rotors(
         ]
     ]
     for pattern in NAMES:
-        named = [b for b in bodies if b != base and _is_named(model, b, pattern)]
+        named = [
+            b
+            for b in bodies
+            if b != base and any(re.search(pattern, one, re.I) for one in _names(model, b))
+        ]
         found = [
             rotor(model.body(b).name, _centre(model, data, b, origin), _spin(model, data, b), b)
             for b in named
@@ -109,16 +114,10 @@ def find_rotors(
     return usable, [] if usable else max(groups, key=len)
 
 
-def _is_named(model: mujoco.MjModel, body: int, pattern: str) -> bool:
+def _names(model: mujoco.MjModel, body: int) -> list[str]:
+    """Return the names of a body and of its joints."""
     first, count = model.body_jntadr[body], model.body_jntnum[body]
-    names = [model.body(body).name, *(model.joint(first + i).name for i in range(count))]
-    return any(re.search(pattern, name, re.I) for name in names)
-
-
-def _of_body(source: Source, model: mujoco.MjModel, body: int) -> RotorFacts | None:
-    first, count = model.body_jntadr[body], model.body_jntnum[body]
-    names = [model.body(body).name, *(model.joint(first + i).name for i in range(count))]
-    return next((source.rotors[name] for name in names if name in source.rotors), None)
+    return [model.body(body).name, *(model.joint(first + i).name for i in range(count))]
 
 
 def _centre(

@@ -71,12 +71,11 @@ class Source:
 
     def error(self, kind: str, name: str, text: str) -> ImportRefused:
         """Return the error about the part `name`; kind: body or joint."""
-        return ImportRefused(f"{place(self.file, self.lines, kind, name)}: {kind} '{name}': {text}")
+        return ImportRefused(f"{self.where(kind, name)}: {kind} '{name}': {text}")
 
-
-def place(file: Path, lines: dict[tuple[str, str], str], kind: str, name: str) -> str:
-    """Return "file line N" of a part; the file where the part is not in `lines`."""
-    return lines.get((kind, name), str(file))
+    def where(self, kind: str, name: str) -> str:
+        """Return "file line N" of a part; the file where the part is not in `lines`."""
+        return self.lines.get((kind, name), str(self.file))
 
 
 def refused_by_mujoco(

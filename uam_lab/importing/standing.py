@@ -70,13 +70,9 @@ def _ranges(parts: Parts, answers: Answers) -> list[Told]:
             text = f"its range of {high - low:.3g} rad is below {LEAST:g} rad"
             raise parts.source.error("joint", model.joint(joint).name, text)
         origin = (FILE, "") if limited else (ASSUMED, "the file has no limits")
-        ranges.append(Told([_rounded(math.degrees(one)) for one in (low, high)], *origin))
+        rounded = [math.trunc(100.0 * math.degrees(one)) / 100.0 for one in (low, high)]  # inwards
+        ranges.append(Told(rounded, *origin))
     return ranges
-
-
-def _rounded(angle: float) -> float:
-    """Return an angle [deg] to 0.01, towards 0."""
-    return math.trunc(100.0 * angle) / 100.0
 
 
 def _in_base(parts: Parts, points: np.ndarray) -> np.ndarray:

@@ -131,7 +131,8 @@ class Feed:
         rest = self._window.last(rest_time)
         still_there = time.monotonic() - self._arrival < SILENCE
         seen.resting = Resting.of(rest) if rest and still_there else None
-        self._age_nodes()
+        for name, heard in self._heard.items():
+            seen.nodes[name] = seen.nodes[name]._replace(age=time.monotonic() - heard)
         if time.monotonic() >= self._host_due:
             self._host_due = time.monotonic() + HOST_PERIOD
             seen.host = self._host.read()
@@ -153,11 +154,6 @@ class Feed:
             self._joints,
             self._commanded,
         )
-
-    def _age_nodes(self) -> None:
-        nodes, now = self.observation.nodes, time.monotonic()
-        for name, heard in self._heard.items():
-            nodes[name] = nodes[name]._replace(age=now - heard)
 
     def _on_imu(self, data: bytes) -> None:
         stamp, rate, force = read_imu(data)

@@ -73,7 +73,7 @@ class UamNode(TunableNode):
         self._at_last_report = (0, 0.0)
         self._dropped_before = 0
         self._waiting: list[str] = []  # required inputs without a message in the last LOG_PERIOD
-        self._guards_end = False  # see `destroy_node`
+        self.guards_end = False  # see `destroy_node`
         self._diagnostics = self.publisher(topics.DIAGNOSTICS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
@@ -189,21 +189,13 @@ class UamNode(TunableNode):
             names = [self.resolve_topic_name(name) for name in self._waiting]
             self.get_logger().info("waiting for " + ", ".join(names))
 
-    def _absolute(self, name: str) -> str:
-        """Return the absolute name of a topic, for messages."""
-        return expanded(self.get_namespace(), name)
-
-    def guard_end(self) -> None:
-        """End the process if the middleware hangs in `destroy_node`."""
-        self._guards_end = True
-
     def destroy_node(self) -> None:
         """Destroy the node; a subclass ends its own work before.
 
         The middleware may hang here when other nodes end at the same moment. In a process of
         `run` it is then ended after END_PATIENCE: exit status 1, and where it hung on stderr.
         """
-        if self._guards_end:
+        if self.guards_end:
             faulthandler.dump_traceback_later(END_PATIENCE, exit=True)
         super().destroy_node()
 
@@ -222,7 +214,8 @@ class UamNode(TunableNode):
             level, summary = ERROR, "; ".join(new)
             self.get_logger().error(summary)
         elif self._waiting and level < ERROR:
-            level, summary = STALE, "waiting for " + ", ".join(map(self._absolute, self._waiting))
+            names = (expanded(self.get_namespace(), name) for name in self._waiting)
+            level, summary = STALE, "waiting for " + ", ".join(names)
         elif dropped > self._dropped_before and level == OK:
             newly = dropped - self._dropped_before
             level, summary = WARN, f"{newly} ticks dropped since last report"
@@ -272,13 +265,11 @@ def run(make: Callable[[], UamNode], name: str) -> int:
     0: stopped by a signal; 1: failure of the node (text in its `failure`, if it has one); 2: bad
     parameters or arguments, with one line on stderr.
     """
-
-    def spin_it(
-        nodes: Sequence[UamNode], running: Callable[[], bool], at_rest: Callable[[], None]
-    ) -> None:
-        spin(nodes, running, nodes[0].wake_up, at_rest)
-
-    return run_together(lambda: [make()], name, spin_it)
+    return run_together(
+        lambda: [make()],
+        name,
+        lambda nodes, running, at_rest: spin(nodes, running, nodes[0].wake_up, at_rest),
+    )
 
 
 def run_together(
@@ -314,7 +305,7 @@ def run_together(
     finally:
         for node in nodes:
             node.times.close()
-            node.guard_end()
+            node.guards_end = True
             node.destroy_node()
         rclpy.try_shutdown()
         stop.ignore()

@@ -111,16 +111,18 @@ class Door:
 
         They are serialized if the subscription is raw.
         """
-        source = self.guards.get(subscription) or self.taker(subscription)
+        taker = self.taker(subscription)
+        source = self.guards.get(subscription) or taker
         kind, raw = subscription.msg_type, subscription.raw
-        while (found := source.take_message()) is not None:
+        while (message := source.take()) is not None:
+            times = taker.times
             if not raw:
                 try:
-                    found = deserialized(found[0], kind), found[1]
+                    message = deserialized(message, kind)
                 except BadMessage as error:
                     self.refuse(subscription, error)
                     continue
-            yield found
+            yield message, times
 
     def messages(self, subscription: Subscription) -> Iterator[Any]:
         """Take and yield the received messages, oldest first."""

@@ -30,9 +30,10 @@ TASKS = Path("/proc/self/task")
 def apply(options: ProcessParameters) -> None:
     """Apply the options to all threads of this process. Raises ParameterError."""
     if cores := cores_of(options.cores):
+        allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
         _for_each_thread(
             lambda thread: os.sched_setaffinity(thread, cores),
-            f"cores: {options.cores}; this process may use {_listed(os.sched_getaffinity(0))}",
+            f"cores: {options.cores}; this process may use {allowed}",
         )
     if options.fifo_priority:
         rule = os.sched_param(options.fifo_priority)
@@ -85,10 +86,6 @@ def try_out(options: ProcessParameters) -> None:
     if tried.returncode:
         said = (tried.stderr or tried.stdout).strip().splitlines()
         raise ParameterError(said[-1] if said else f"exit status {tried.returncode}")
-
-
-def _listed(cores: set[int]) -> str:
-    return ", ".join(map(str, sorted(cores)))
 
 
 if __name__ == "__main__":  # of `try_out`

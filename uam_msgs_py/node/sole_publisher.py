@@ -108,11 +108,6 @@ class Taker:
             return None
         return ctypes.string_at(self._data.buffer, self._data.length)
 
-    def take_message(self) -> tuple[bytes, dict[str, int]] | None:
-        """Return the next received message and its times; None without one."""
-        data = self.take()
-        return None if data is None else (data, self.times)
-
     @property
     def times(self) -> dict[str, int]:
         """Times of the last message [ns], as of rclpy's handle."""
@@ -165,11 +160,6 @@ class SolePublisher:
                 self._life.heard(taker.info.received_timestamp)
                 return data
         return None
-
-    def take_message(self) -> tuple[bytes, dict[str, int]] | None:
-        """Return the next message of the rightful publisher and its times; None without one."""
-        data = self.take()
-        return None if data is None else (data, self.taker.times)
 
     @property
     def refused(self) -> dict[str, int]:

@@ -8,8 +8,6 @@
 Services are served between two ticks, see `executor`.
 """
 
-from typing import Any
-
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
@@ -49,13 +47,14 @@ class TunableNode(Node):
 
     def change_parameters(self, changes: list[Parameter], by: str) -> SetParametersResult:
         """Change all or none and publish the result; by: origin of the request."""
-        old = {change.name: self._value(change.name) for change in changes}
+        known = [change.name for change in changes if self.has_parameter(change.name)]
+        old = {name: self.get_parameter(name).value for name in known}
         result = self.check_parameters(changes)
         if result.successful:
             result = super().set_parameters_atomically(changes)
         if not result.successful:
             self.get_logger().warning(f"refused, old values stay in effect: {result.reason}")
-        values = {change.name: (old[change.name], change.value) for change in changes}
+        values = {change.name: (old.get(change.name), change.value) for change in changes}
         self.publish_change(
             ParameterChange(self.get_name(), by, values, "" if result.successful else result.reason)
         )
@@ -86,9 +85,6 @@ class TunableNode(Node):
         changes = [Parameter.from_parameter_msg(item) for item in request.parameters]
         response.result = self.check_parameters(changes)
         return response
-
-    def _value(self, name: str) -> Any:
-        return self.get_parameter(name).value if self.has_parameter(name) else None
 
 
 def _refusal(reason: str) -> SetParametersResult:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from uam_sim_bridge.faults import cable_faults as kinds
 from uam_sim_bridge.faults.cable_faults import CableFault
 from uam_sim_bridge.faults.schedule import Schedule
@@ -32,16 +30,12 @@ class Cables:
         changed = self.timeline.update(stamp)
         for one in changed:
             if not one.fault.WIRING:
-                self._act(one.fault, one.active)
+                getattr(self, f"_{one.fault.NAME}")(one.fault, one.active)
         for joint, fault in self._hot.items():
             servo = self._lab.servos[joint]
             rise = fault.rate * self._lab.plant.period
             servo.temperature = min(fault.highest, servo.temperature + rise)
         return changed
-
-    def _act(self, fault: CableFault, on: bool) -> None:
-        act: Callable[[CableFault, bool], None] = getattr(self, f"_{fault.NAME}")
-        act(fault, on)
 
     def _bus_unplugged(self, fault: CableFault, on: bool) -> None:
         (self._lab.bus.unplug if on else self._lab.bus.plug_in)()

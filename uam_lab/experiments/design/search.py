@@ -121,7 +121,10 @@ class Search:
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
-        self._points = self._operating_points()
+        poses, mass = self.facts.poses, payload(described, criteria)
+        loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
+        # label, joint angles and payload [kg] of each operating point
+        self._points = [*((name, arm, 0.0) for name, arm in poses.items()), loaded]
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -220,12 +223,6 @@ class Search:
                 }
                 return Found(described, profile, tuple(cases), named)
         return Found(described, profile, tuple(cases), {})
-
-    def _operating_points(self) -> list[tuple[str, tuple[float, ...], float]]:
-        """Return label, joint angles and payload [kg] of each operating point."""
-        poses, mass = self.facts.poses, payload(self._described, self._criteria)
-        loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
-        return [*((name, arm, 0.0) for name, arm in poses.items()), loaded]
 
     def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, Fault]:
         """Return the fault of each loop that has one."""

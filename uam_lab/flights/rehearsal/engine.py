@@ -8,7 +8,7 @@ It releases all processes, devices and ports, also after an error.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -182,16 +182,13 @@ class _Rehearsal:
             ),
             publishers,
             start,
-            lambda children: self._announcement(children, devices),
+            lambda children: [
+                f"{len(children.names)} processes in ROS domain {self._ports.domain}; "
+                f"devices in {devices}"
+            ],
             lambda children, listener: RehearsalCourse(self, children, listener),
         )
         return failure
-
-    def _announcement(self, children: Processes, devices: Path) -> Iterator[str]:
-        yield (
-            f"{len(children.names)} processes in ROS domain {self._ports.domain}; "
-            f"devices in {devices}"
-        )
 
     def _start_laboratory(self, children: Processes, devices: Path, publishers: str) -> bool:
         """Start laboratory and autopilot; return whether the devices are there.

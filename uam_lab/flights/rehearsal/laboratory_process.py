@@ -71,7 +71,8 @@ def parameters(
         "hil": TCP if settings.px4 is None else LINE,
         "faults": settings.faults.only(CABLE).to_text(),
         "person": person,
-        "flight_limit": _flight_limit(settings),
+        # [s] after arming: with faults it may never land; 0, never: a person may fly by goals
+        "flight_limit": time_limit(settings.scenario, None) if settings.faults else 0.0,
         "statistics": str(logs / LABORATORY_FILE),
     }
     found["poses"] = TOPIC if lab.mocap is None else NATNET
@@ -85,14 +86,6 @@ def parameters(
             "calibration": lab.mocap.calibration,
         }
     return found
-
-
-def _flight_limit(settings: FlightSettings) -> float:
-    """Return the time [s] after arming that ends a flight with faults, which may never land.
-
-    0, never, without faults: a person may fly by goals.
-    """
-    return time_limit(settings.scenario, None) if settings.faults else 0.0
 
 
 def _magnet_output(lab: Lab) -> dict[str, Any]:

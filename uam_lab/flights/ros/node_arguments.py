@@ -101,13 +101,14 @@ def parameters(
         "time_limit": _time_limit(settings),
         "statistics": str(folder.path / "logs" / "mujoco_sim.json"),
     }
+    delay = SetpointDelay.of(settings.vehicle_changes.get("effects", {}), settings.seed)
     sections[wiring.BRIDGE] |= {
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
         # system id: as PX4 SITL numbers its instances; 1 for a flight controller
         "autopilot_system": 1 if in_the_loop(settings) else ports.instance + 1,
         "faults": settings.faults.only(LINK).to_text(),
-        "network_delay": _network_delay(settings),
+        "network_delay": "" if delay is None else delay.to_text(),
         "imu_clock": "topic",
     }
     if users_autopilot(settings):
@@ -200,12 +201,6 @@ def _px4_parameters(settings: FlightSettings, folder: ResultFolder) -> dict[str,
     file = folder.path / "logs" / REQUIRED
     file.write_text(px4_parameters.required(values, in_the_loop(settings)), encoding="utf-8")
     return {"required_parameters": str(file.absolute()), "set_parameters": own is not None}
-
-
-def _network_delay(settings: FlightSettings) -> str:
-    """Return the delay of the messages to the autopilot as text; "" for none."""
-    delay = SetpointDelay.of(settings.vehicle_changes.get("effects", {}), settings.seed)
-    return "" if delay is None else delay.to_text()
 
 
 def write(

@@ -48,9 +48,10 @@ class Device:
 
 def devices(lab: Lab) -> list[Device]:
     """Return the devices of a lab file, each once."""
+    arm = f"supply of the servos; ls -l /dev/serial/by-id; uam arm --config {lab.file}"
     return [
         _mocap(lab),
-        Device("arm", _arm_advice(lab), lambda reports: _driven(reports, wiring.ARM_DRIVER)),
+        Device("arm", arm, lambda reports: _driven(reports, wiring.ARM_DRIVER)),
         *([_magnet(lab)] if lab.magnet.through in (GPIO, AUTOPILOT) else []),
         Device("autopilot", _autopilot_advice(lab), lambda reports: _autopilot(lab, reports)),
         Device("imu", _imu_advice(lab), lambda reports: _sensor(reports, topics.IMU)),
@@ -90,10 +91,6 @@ def _autopilots_magnet(reports: Reports) -> tuple[bool, str]:
     state = report.values.get("magnet", "")
     on = {"True": "on", "False": "off"}.get(state)
     return (False, "no acknowledgement of the autopilot") if on is None else (True, on)
-
-
-def _arm_advice(lab: Lab) -> str:
-    return f"supply of the servos; ls -l /dev/serial/by-id; uam arm --config {lab.file}"
 
 
 def _autopilot_advice(lab: Lab) -> str:

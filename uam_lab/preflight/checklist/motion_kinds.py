@@ -47,7 +47,22 @@ class Pose:
         )
 
 
-class Turn:
+class Kind:
+    """What a motion is measured by. labels: of its components; unit: of all of them."""
+
+    labels: tuple[str, ...]
+    unit: str
+
+    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
+        """Return the components (n,) of the motion since `begin`."""
+        raise NotImplementedError
+
+    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
+        """Yield whether other sensors agree; nothing where no other one measures the motion."""
+        yield from ()
+
+
+class Turn(Kind):
     """A turn of the vehicle about its axes, by motion capture; checked by IMU and commands."""
 
     labels, unit = AXES, "rad"
@@ -91,7 +106,7 @@ class Turn:
         )
 
 
-class Shift:
+class Shift(Kind):
     """A displacement of the vehicle, in the axes of its heading at the beginning."""
 
     labels, unit = DIRECTIONS, "m"
@@ -103,12 +118,8 @@ class Shift:
         moved = now.position - begin.position
         return np.array([moved @ nose, nose[0] * moved[1] - nose[1] * moved[0], moved[2]])
 
-    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
-        """Yield nothing: no other sensor measures the position."""
-        yield from ()
 
-
-class JointTurn:
+class JointTurn(Kind):
     """A turn of a joint."""
 
     unit = "rad"
@@ -119,7 +130,3 @@ class JointTurn:
     def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
         """Return the turns (n,) [rad] of all joints since `begin`."""
         return now.joints - begin.joints
-
-    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
-        """Yield nothing: no other sensor measures the joints."""
-        yield from ()

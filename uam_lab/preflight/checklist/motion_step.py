@@ -8,14 +8,13 @@ wrong direction fails as soon as it is kept.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 
 from uam_lab.preflight.checklist.limits import MotionLimits
-from uam_lab.preflight.checklist.motion_kinds import Pose
+from uam_lab.preflight.checklist.motion_kinds import Kind, Pose
 from uam_lab.preflight.checklist.observation import (
     Sample,
     Window,
@@ -28,17 +27,6 @@ from uam_lab.preflight.checklist.step import MOTION, Finding, Situation, Step, S
 STILL_THERE = 0.25  # share of the amplitude within which a pose is not left yet
 LEFT_BEHIND = 0.75  # share of the amplitude by which a kept pose is left before the next counts
 _UPWARD = np.array([0.0, 0.0, 1.0])
-
-
-class Kind(Protocol):
-    """What a motion is measured by, see `motion_kinds`."""
-
-    labels: tuple[str, ...]
-    unit: str
-
-    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray: ...
-
-    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterable[Finding]: ...
 
 
 class Stage(Enum):

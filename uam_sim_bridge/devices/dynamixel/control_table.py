@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from uam_sim_bridge.devices import INSTALL
 from uam_sim_bridge.devices.servo_bus import Register
 
 FIRST_RAM = 64  # addresses below are EEPROM: written with torque off only
@@ -79,10 +80,7 @@ def folder() -> Path:
     """Return the maker's folder of .model files. Raises ControlTableError without the package."""
     found = importlib.util.find_spec("dynamixel_easy_sdk")
     if found is None or found.origin is None:
-        raise ControlTableError(
-            "the package dynamixel-sdk is missing: pip install -e '.[hardware]' in a clone; "
-            "colcon: docs/index.md"
-        )
+        raise ControlTableError(f"the package dynamixel-sdk is missing: {INSTALL}")
     return Path(found.origin).parent / "control_table"
 
 

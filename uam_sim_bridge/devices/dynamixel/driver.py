@@ -191,7 +191,10 @@ class ArmDriver:
                 reading = self._read_states()
                 self._upkeep.read_slowly(begun)
             except BusLost as error:
-                self._lose_device(error)
+                self.device_problem = str(error)
+                self.bus.close()
+                self._open, self._reading = False, None
+                self._next_open = self._clock() + self.parameters.reopen_interval
                 return None
             self.meter.add(begun, self._clock())
             return reading
@@ -320,12 +323,6 @@ class ArmDriver:
         """Return the registers of STATE in the bytes of a common read."""
         parts = (servo.table[name].of(data, self._span.address) for name in STATE)
         return [int.from_bytes(part, "little", signed=True) for part in parts]
-
-    def _lose_device(self, error: BusLost) -> None:
-        self.device_problem = str(error)
-        self.bus.close()
-        self._open, self._reading = False, None
-        self._next_open = self._clock() + self.parameters.reopen_interval
 
     def _reopen(self, now: float) -> bool:
         if now < self._next_open:

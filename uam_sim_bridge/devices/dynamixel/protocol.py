@@ -45,16 +45,6 @@ def crc16(data: bytes, start: int = 0) -> int:
     return value
 
 
-def stuff(body: bytes) -> bytes:
-    """Return `body` with FD after each FF FF FD."""
-    return body.replace(STUFFED, STUFFED + b"\xfd")
-
-
-def unstuff(body: bytes) -> bytes:
-    """Return `body` without the stuffed bytes."""
-    return body.replace(STUFFED + b"\xfd", STUFFED)
-
-
 @dataclass(frozen=True)
 class Packet:
     """An instruction, or a STATUS packet: error, then data; parameters without stuffing."""
@@ -64,13 +54,15 @@ class Packet:
     parameters: bytes = b""
 
     def encode(self) -> bytes:
-        """Return the bytes on the wire."""
-        return _framed(self.id, stuff(bytes([self.instruction]) + self.parameters))
+        """Return the bytes on the wire, with FD after each FF FF FD."""
+        body = (bytes([self.instruction]) + self.parameters).replace(STUFFED, STUFFED + b"\xfd")
+        packet = HEADER + bytes([self.id]) + (len(body) + 2).to_bytes(2, "little") + body
+        return packet + crc16(packet).to_bytes(2, "little")
 
 
 def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
     """Return the bytes of a status packet."""
-    return _framed(servo, stuff(bytes([STATUS, error]) + parameters))
+    return Packet(servo, STATUS, bytes([error]) + parameters).encode()
 
 
 def fast_status(answers: list[tuple[int, int, bytes]], expected: int) -> list[bytes]:
@@ -134,14 +126,9 @@ class PacketReader:
                 self._skip_header()
                 continue
             self._bytes = self._bytes[7 + length :]
-            body = whole[7:] if fast else unstuff(whole[7:])
+            body = whole[7:] if fast else whole[7:].replace(STUFFED + b"\xfd", STUFFED)
             return Packet(whole[4], body[0], body[1:])
 
     def _skip_header(self) -> None:
         self.damaged += 1
         self._bytes = self._bytes[len(HEADER) :]
-
-
-def _framed(servo: int, body: bytes) -> bytes:
-    packet = HEADER + bytes([servo]) + (len(body) + 2).to_bytes(2, "little") + body
-    return packet + crc16(packet).to_bytes(2, "little")

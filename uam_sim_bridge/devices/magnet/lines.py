@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.settings.parameter_set import ParameterSet, choice, integer, number, switch, text
+from uam_sim_bridge.devices import INSTALL
 
 HOLD, RELEASE = "hold", "release"  # no "off", which YAML reads as false
 
@@ -70,10 +71,7 @@ class GpioLine(Line):
     def __init__(self, chip: str, number: int = 0, active_low: bool = False) -> None:
         """chip: its device; active_low: on is a low level. Raises MagnetError."""
         if gpiod is None:
-            raise MagnetError(
-                "chip: the package gpiod is missing: pip install -e '.[hardware]' in a clone; "
-                "colcon: docs/index.md"
-            )
+            raise MagnetError(f"chip: the package gpiod is missing: {INSTALL}")
         settings = gpiod.LineSettings(
             direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE
         )

@@ -15,6 +15,7 @@ import time
 
 import numpy as np
 
+from uam_sim_bridge.devices import INSTALL
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 
 PROGRAM = "uam_sim_bridge.devices.mocap.library_process"
@@ -40,10 +41,7 @@ class LibrarySource:
         """system: of SYSTEMS; server: its computer; local: own address in its network; port: of
         commands. Only OptiTrack has the last two. Raises MocapError."""
         if importlib.util.find_spec("motioncapture") is None:
-            raise MocapError(
-                "source motioncapture needs the package motioncapture: pip install -e "
-                "'.[hardware]' in a clone; colcon: docs/index.md"
-            )
+            raise MocapError(f"source motioncapture needs the package motioncapture: {INSTALL}")
         options = {"hostname": server}
         if system == "optitrack":
             options |= {"port_command": str(port)} | ({"interface_ip": local} if local else {})

@@ -15,6 +15,7 @@ import time
 
 import numpy as np
 
+from uam_sim_bridge.devices import INSTALL
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 
 try:
@@ -43,10 +44,7 @@ class NatNetSource:
         Raises MocapError.
         """
         if messages is None:
-            raise MocapError(
-                "source natnet needs the package natnet: pip install -e '.[hardware]' in a clone; "
-                "colcon: docs/index.md"
-            )
+            raise MocapError(f"source natnet needs the package natnet: {INSTALL}")
         try:
             self._server = socket.gethostbyname(server), port
             self._local = local or _route(self._server)
