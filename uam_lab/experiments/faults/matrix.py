@@ -164,7 +164,9 @@ def read(
     only: names of faults, () for all; moments: names of columns, () for all; scenario: instead of
     the file's; vehicle: None for the default one; draws: see `Matrix`.
     """
-    document = _document(file)
+    top = read_section(file, FaultError)
+    top.only((*KEYS, DURATIONS))
+    document = top.values | {key: top.entry(key) for key in KEYS}
     name = scenario or str(document["scenario"])
     lasting, where = document.get(DURATIONS, []), str(file)
     if not isinstance(lasting, list):
@@ -195,12 +197,6 @@ def read(
     own = tuple(row.moments for row in kept)
     drawn = (draws, tuple(lasting)) if draws else ()
     return Matrix(name, chosen, entries, promises, tuple(out), own, *drawn)
-
-
-def _document(file: Path) -> dict[str, Any]:
-    top = read_section(file, FaultError)
-    top.only((*KEYS, DURATIONS))
-    return top.values | {key: top.entry(key) for key in KEYS}
 
 
 def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, Any]]:

@@ -91,7 +91,8 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
             _draw_costs(top.subplots(), costs)
         else:
             curve, plane = top.subplots(1, 2)
-            _draw_hypervolume(curve, trials)
+            curve.step(np.arange(len(trials)), hypervolumes(trials), where="post", color=style.INK)
+            curve.set(xlabel="evaluation", ylabel="area under the front [ms]")
             _draw_front(plane, trials, best, start, space.delay_margin)
         figure.suptitle(
             f"Search {study.study_name}, {space.start.vehicle.name}: {len(costs)} evaluations; "
@@ -115,11 +116,6 @@ def _draw_costs(axis: Axes, costs: np.ndarray) -> None:
     axis.step(numbers, best_so_far, where="post", color=style.INK, label="best so far")
     axis.set(yscale="log", xlabel="evaluation", ylabel="cost")
     axis.legend(loc="upper right")
-
-
-def _draw_hypervolume(axis: Axes, trials: Sequence[FrozenTrial]) -> None:
-    axis.step(np.arange(len(trials)), hypervolumes(trials), where="post", color=style.INK)
-    axis.set(xlabel="evaluation", ylabel="area under the front [ms]")
 
 
 def _draw_front(

@@ -126,15 +126,11 @@ class Variable(NamedTuple):
     good: str = ""
 
 
-def _is_domain(value: str) -> bool:
-    return value.isascii() and value.isdecimal() and int(value) <= LAST_DOMAIN
-
-
 VARIABLES = {
     "ROS_DOMAIN_ID": Variable(
         f" is not in 0..{LAST_DOMAIN}",
         f"{BY_HAND} fail with it: unset {{}}",
-        _is_domain,
+        lambda value: value.isascii() and value.isdecimal() and int(value) <= LAST_DOMAIN,
         f": {BY_HAND} use it",
     ),
     "RMW_IMPLEMENTATION": Variable(

@@ -114,11 +114,7 @@ def _attitude(data: Data) -> list[tuple[str, np.ndarray]]:
     quaternion = np.column_stack([data[f"q[{i}]"] for i in (1, 2, 3, 0)])  # x, y, z, w
     yaw, pitch, roll = Rotation.from_quat(quaternion).as_euler("ZYX").T  # NED, FRD
     turned = np.angle(np.exp(1j * (np.pi / 2.0 - yaw)))
-    return [("roll", roll), ("pitch", -pitch), ("yaw", turned)]
-
-
-def _estimated(data: Data) -> list[tuple[str, np.ndarray]]:
-    return [(f"estimate.{name}", values) for name, values in _attitude(data)]
+    return [("estimate.roll", roll), ("estimate.pitch", -pitch), ("estimate.yaw", turned)]
 
 
 def _rates(data: Data) -> list[tuple[str, np.ndarray]]:
@@ -151,7 +147,7 @@ def _motors(data: Data) -> list[tuple[str, np.ndarray]]:
 
 # topic of PX4 → its columns under our names
 TOPICS: dict[str, Callable[[Data], list[tuple[str, np.ndarray]]]] = {
-    "vehicle_attitude": _estimated,
+    "vehicle_attitude": _attitude,
     "vehicle_angular_velocity": _rates,
     "vehicle_rates_setpoint": _rate_setpoint,
     "vehicle_local_position": _position,

@@ -18,7 +18,6 @@ from uam_lab.report.figures.panels import DrawnFlight
 
 if TYPE_CHECKING:
     from uam_lab.analysis.lyapunov_bound import ComparisonSystem
-    from uam_lab.analysis.stability import Subsystem
 
 SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
 BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
@@ -42,12 +41,14 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     total.set_ylabel("$V$", parse_math=True)
     for axis, name in zip(each, SUBSYSTEMS, strict=True):
         subsystem = found.subsystems[name]
-        for values, colour in zip(_terms(subsystem), TERMS.values(), strict=True):
+        parts = subsystem.parts
+        terms = parts.tracking, parts.gains, parts.zeta, parts.bias
+        for values, colour in zip(terms, TERMS.values(), strict=True):
             if not values.any():
                 continue
-            terms = panels.thin(found.time, np.maximum(values, LOWEST), BUCKETS)
-            axis.plot(*terms, color=colour, linewidth=0.9)
-        _bounded(axis, found.time, subsystem.parts.total, subsystem.comparison)
+            drawn = panels.thin(found.time, np.maximum(values, LOWEST), BUCKETS)
+            axis.plot(*drawn, color=colour, linewidth=0.9)
+        _bounded(axis, found.time, parts.total, subsystem.comparison)
         axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$", parse_math=True)
     handles = [
         style.key("$V$", style.INK, 1.5),
@@ -118,11 +119,6 @@ def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _only(flights: Sequence[DrawnFlight]):
     """Return the analysis of the flight if there is exactly one flight."""
     return flights[0].stability if len(flights) == 1 else None
-
-
-def _terms(subsystem: Subsystem) -> tuple[np.ndarray, ...]:
-    parts = subsystem.parts
-    return parts.tracking, parts.gains, parts.zeta, parts.bias
 
 
 def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: ComparisonSystem) -> None:

@@ -130,8 +130,11 @@ def _axis(axis: Axis, limits: tuple[float, float], share: float) -> Part:
     """Return an axis; share of the figure's width that has room for the numbers at it."""
     logarithmic = axis.get_scale() == "log"
     edge = "labelbottom" if axis.axis_name == "x" else "labelleft"
-    if logarithmic:
+    decades: Part = {}
+    if logarithmic:  # whole powers of ten, at most five
         limits = tuple(np.log10(limits))
+        step = math.ceil((limits[1] - limits[0]) / 5.0)
+        decades = {"dtick": step, "exponentformat": "power"}
     return {
         "type": "log" if logarithmic else "linear",
         "range": [float(one) for one in limits],
@@ -141,13 +144,7 @@ def _axis(axis: Axis, limits: tuple[float, float], share: float) -> Part:
         "zeroline": False,
         "nticks": round(MOST_TICKS * share),
         "tickangle": 0,
-        **(_decades(limits) if logarithmic else {}),
-    }
-
-
-def _decades(limits: tuple[float, float]) -> Part:
-    """Return the numbers at a logarithmic axis: whole powers of ten, at most five."""
-    return {"dtick": math.ceil((limits[1] - limits[0]) / 5.0), "exponentformat": "power"}
+    } | decades
 
 
 def _shapes(axes: Axes, x: str, y: str) -> Iterator[Part]:

@@ -55,6 +55,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     info = _json(directory / "info.json")
     controller = catalogue.label(metrics.get("controller"))
     rendered = rendered or existing(directory)
+    shots = rendered.snapshots
     try:
         comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
     except parameters.ProfileError as error:
@@ -80,7 +81,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         controller=controller,
         strip=_embedded(rendered.strip),
         video=_embedded(rendered.video),
-        poster=_embedded(_middle(rendered.snapshots)),
+        poster=_embedded(shots[len(shots) // 2] if shots else None),  # before the video plays
         problem=rendered.problem,
         **figure_entries(directory / "figures", FIGURES),
         stability=_stability(directory / "stability.json"),
@@ -92,11 +93,6 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     )
     write_text(directory / "report.html", text)
     return directory / "report.html"
-
-
-def _middle(pictures: Sequence[Path]) -> Path | None:
-    """Return the picture that stands for the video before it plays."""
-    return pictures[len(pictures) // 2] if pictures else None
 
 
 def _stability(file: Path) -> dict[str, Any] | None:
