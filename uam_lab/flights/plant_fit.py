@@ -72,6 +72,7 @@ def _battery(profile: Profile, effects: Effects) -> Iterator[str]:
     if capacity < HALF * usual:
         resistance = effects[name]["resistance"] * capacity / usual
         yield (
-            f"{name}: {capacity:g} A h are few for {mass:g} kg: the thrust falls far; as for the "
-            f"S-500: --effect {name}:capacity={usual:.3g},resistance={resistance:.2g}"
+            f"{name}: {capacity:g} A h are few for {mass:g} kg: the thrust falls far, and heading "
+            f"or path is lost; as for the S-500: --effect {name}:capacity={usual:.3g},"
+            f"resistance={resistance:.2g}"
         )
