@@ -256,11 +256,16 @@ def test_without_a_flight_before_there_is_no_stream_for_a_vehicle_in_the_air(com
     assert any("OFFBOARD is not possible" in text for text in said)
 
 
-@pytest.mark.parametrize(("lift", "part"), [(0.0, 0.5), (5.0, 1.5)])
-def test_thrust_and_rates_of_a_released_vehicle_are_bounded(lift, part):
+@pytest.mark.parametrize(
+    ("height", "lift", "part"),
+    # one that stands would lift off, and its acceleration would ask for more
+    [(1.0, 0.0, 0.5), (1.0, 5.0, 1.5), (0.02, 0.8, 0.8), (0.02, 1.0, 0.97), (0.02, 1.4, 0.97)],
+)
+def test_thrust_and_rates_of_a_released_vehicle_are_bounded(height, lift, part):
     source = in_flight()
     state = state_at(1.0)
     flown = source.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING).thrust
+    state[0, 2] = height
     state[1, 3:6] = 9.0, -9.0, 1.0
     source.note_state(1.1, pushed(state, lift))
     sent = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
@@ -304,6 +309,9 @@ def test_until_the_mission_has_resumed_the_setpoint_stays(height):
         assert sent.thrust == before.thrust > 0.3
         decayed = 1.0 - (now - 1.1) / 0.2
         np.testing.assert_allclose(swap_body(sent.rates), [decayed, 0.0, 0.0], atol=1e-12)
+    ends = FLYING._replace(disarming=True)  # the mission does not resume: on the ground at once
+    sent = source.commanded(1.29, state, False, WEIGHT, None, ATTITUDE, ends)
+    assert (sent.thrust == 0.0) == (height < 0.3)
     state[1, 3] = 0.0
     sent = source.commanded(1.295, state, True, WEIGHT, REST, ATTITUDE, FLYING)
     assert sent.thrust == pytest.approx(before.thrust, rel=0.05)

@@ -38,6 +38,7 @@ MOST_RATES = np.array([2.0, 2.0, 3.5])
 # vehicle that stands already must not lift off
 CLIMBING = np.array([math.nan, math.nan, 0.3])
 LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
+LOW_LIFT = 0.97  # the upper one near the ground: as above, and each hop would ask for more thrust
 
 NO_STREAM = "no stream, OFFBOARD is not possible"
 
@@ -58,6 +59,7 @@ class Situation(NamedTuple):
     let_go: the mission requires the autopilot's failsafe. released: somebody else has control.
     followed: it flies the setpoints, in OFFBOARD. stopped: the motors must stay still. withheld:
     its reports may be older than a gap of the stream. lost: its failsafe acts since such a gap.
+    disarming: it is asked to disarm.
     """
 
     armed: bool
@@ -68,6 +70,7 @@ class Situation(NamedTuple):
     stopped: bool = False
     withheld: bool = False
     lost: bool = False
+    disarming: bool = False
 
 
 def silent(text: str, key: str | None) -> None:
@@ -168,7 +171,7 @@ class SetpointSource:
             self._say(f"no usable commands while released: {NO_STREAM}", "hold")
             return None
         if self._handed_over(now):
-            return self._at_present(now)
+            return self._at_present(now, situation)
         if not armed or (landed and not high):
             return self._idle
         velocity, longest, p = UNKNOWN, None, self.hold.parameters
@@ -199,14 +202,15 @@ class SetpointSource:
             self._say(f"thrust to hover unknown: {NO_STREAM}", "hold")
             return None
         self._present_at = now
-        return self._at_present(now)
+        return self._at_present(now, situation)
 
-    def _at_present(self, now: float) -> Target:
+    def _at_present(self, now: float, situation: Situation) -> Target:
         """Return the setpoint that keeps the present motion: body rates, attitude and thrust.
 
         The thrust is the mean thrust of the flight so far, times the present acceleration along
-        the thrust axis in parts of gravity. After control came back the rates decay to zero within
-        HANDOVER: nothing else would stop the rotation if no commands came.
+        the thrust axis in parts of gravity; low down it does not lift off. After control came back
+        the rates decay to zero within HANDOVER: nothing else would stop the rotation if no commands
+        came.
         """
         angles, rates, lift = np.zeros((3, 3)), np.zeros(3), 1.0
         angles[0] = np.nan_to_num(self._attitude(now))
@@ -216,7 +220,8 @@ class SetpointSource:
             gravity = self.map.gravity
             force = self._motion[CHI_DDOT, POSITION] + np.array([0.0, 0.0, gravity])
             lift = float(force @ matrix_from_euler(angles[0])[:, Z]) / gravity
-        thrust = self.map.scaled(self.hold.mean_thrust, min(MOST_LIFT, max(LEAST_LIFT, lift)))
+        most = MOST_LIFT if self._high(situation) else LOW_LIFT
+        thrust = self.map.scaled(self.hold.mean_thrust, min(most, max(LEAST_LIFT, lift)))
         return self.type(Desired(rates, angles, thrust))
 
     @property
@@ -235,7 +240,8 @@ class SetpointSource:
 
     def _low(self, now: float, situation: Situation) -> bool:
         """Whether an idle command means thrust 0."""
-        return not self._high(situation) and not self._handed_over(now)
+        ends = situation.disarming or not self._handed_over(now)
+        return not self._high(situation) and ends
 
     def _high(self, situation: Situation) -> bool:
         """Whether the vehicle is armed and more than `ground_margin` above its last disarmed

@@ -21,7 +21,7 @@ from uam_control.frames import swap_body
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.offboard.modes import Mode
-from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
+from uam_control.offboard.sequence import LINK_GAP, OffboardSequence, Phase
 from uam_control.setpoints.level_hold import HoldParameters, follow_thrust
 from uam_control.setpoints.loop_delay import DelayNumbers
 from uam_control.setpoints.rate_thrust_map import (
@@ -207,6 +207,7 @@ class BridgeStage:
             sequence.stopped,
             sequence.withheld,
             sequence.after_loss,
+            sequence.phase is Phase.DISARMING,
         )
         if situation != self._situation:
             self._situation = Situation(*situation)
