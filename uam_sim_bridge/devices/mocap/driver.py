@@ -12,7 +12,7 @@ import numpy as np
 
 from uam_control.stamps import SECOND
 from uam_sim_bridge.devices.mocap.calibration import Calibration
-from uam_sim_bridge.devices.mocap.frame import Frame, MocapError, MocapSource
+from uam_sim_bridge.devices.mocap.frame import Frame, MocapError, MocapSource, unknown_body
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 
 RESTART = 240  # frames back, two seconds at 120 Hz: the server counts anew
@@ -186,7 +186,9 @@ class MocapDriver:
         deadline = time.monotonic() + START_TIME
         while self._source.names is None and time.monotonic() < deadline:
             self._source.frames(0.05)
-        if self._parameters.source == "natnet" and (missing := self._missing()):
+        if self._parameters.source == "natnet" and (
+            missing := unknown_body(self._source, self._calibrations)
+        ):
             raise MocapError(missing)
 
     def close(self) -> None:
@@ -239,17 +241,6 @@ class MocapDriver:
         self._latencies.append(arrival - exposed)
         return stamp
 
-    def _missing(self) -> str:
-        """Return one line about a body that the server does not know, "" if it knows all."""
-        names = self._source.names
-        if names is None:
-            return ""
-        for name in self._calibrations:
-            if name not in names:
-                there = ", ".join(sorted(names)) or "none"
-                return f"no rigid body '{name}' in {self._source.description}; there are: {there}"
-        return ""
-
     def health(self) -> tuple[Level, str]:
         """Return the level and one line."""
         now, limit = time.monotonic(), self._parameters.silent_after
@@ -263,7 +254,7 @@ class MocapDriver:
                 f"the list of bodies of {source.description} cannot be read: {why}; "
                 "stream rigid bodies only"
             )
-        if missing := self._missing():
+        if missing := unknown_body(source, self._calibrations):
             return Level.ERROR, missing
         if now - self._last_frame > limit:
             return Level.ERROR, f"no frames from {source.description}; is it paused?"

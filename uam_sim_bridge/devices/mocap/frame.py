@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -59,3 +60,13 @@ class MocapSource(Protocol):
     def close(self) -> None:
         """End the connection."""
         ...
+
+
+def unknown_body(source: MocapSource, bodies: Iterable[str]) -> str:
+    """Return one line about a body that the server does not know, "" before its list arrives."""
+    names = source.names
+    for name in () if names is None else bodies:
+        if name not in names:
+            there = ", ".join(sorted(names)) or "none"
+            return f"no rigid body '{name}' in {source.description}; there are: {there}"
+    return ""

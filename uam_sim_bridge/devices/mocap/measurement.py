@@ -16,7 +16,7 @@ import numpy as np
 
 from uam_control.settings.csv_table import CsvTable
 from uam_control.stamps import SECOND
-from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError, MocapSource
+from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError, MocapSource, unknown_body
 
 FEWEST = 60  # poses, half a second at 120 Hz
 # A tracker has some 0.4 mm and 0.1 deg of noise; a vehicle that is held by hand moves more.
@@ -117,8 +117,7 @@ def until_known(source: MocapSource, body: str) -> None:
             return
     if source.names is None:
         raise MocapError(f"no answer of {source.description}; is it on, and does it stream?")
-    there = ", ".join(sorted(source.names)) or "none"
-    raise MocapError(f"no rigid body '{body}' in {source.description}; there are: {there}")
+    raise MocapError(unknown_body(source, [body]))
 
 
 def tracked_poses(source: MocapSource, body: str, duration: float) -> list[TimedPose]:
