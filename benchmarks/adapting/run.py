@@ -10,14 +10,7 @@ import numpy as np
 
 from adapting import design
 from adapting.description import NOMINAL, Condition, Row, Study
-from adapting.flights import (
-    ROWS,
-    StudyFlight,
-    StudyResult,
-    flights,
-    mark,
-    measure,
-)
+from adapting.flights import ROWS, StudyFlight, StudyResult, flights, mark, measure
 from uam_control.profiles.profile import Profile, load_profile
 from uam_lab.experiments.trials.experiment import Experiment
 from uam_lab.experiments.workers.place import Workplace

@@ -17,12 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from uam_control.coordinates import arm_coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import preflight_message, read_items
-from uam_msgs_py.messages.convert import (
-    ImuWriter,
-    JointStateWriter,
-    PoseWriter,
-    SetpointWriter,
-)
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, SetpointWriter
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, RadioState
 

@@ -18,16 +18,7 @@ from uam_lab.cockpit.gains import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import ChecklistPanel, _facts, checklist_html, headline
 from uam_lab.cockpit.page import BUTTONS
 from uam_lab.cockpit.services import About
-from uam_lab.cockpit.vehicle_health import (
-    BAD,
-    CAUTION,
-    CHAIN,
-    GOOD,
-    TICK,
-    UNKNOWN,
-    Health,
-    grade,
-)
+from uam_lab.cockpit.vehicle_health import BAD, CAUTION, CHAIN, GOOD, TICK, UNKNOWN, Health, grade
 from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView, shapes
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
 from uam_msgs_py.messages.layouts import BadMessage

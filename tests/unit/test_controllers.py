@@ -10,11 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.control.controllers import (
-    ArmController,
-    AttitudeController,
-    PositionController,
-)
+from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.output_limits import limit_force
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS, label

@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 
 from uam_control.grasp import grasp_windows
 from uam_control.mission import ScenarioError, ScenarioOptions, load_scenario
-from uam_control.mission.scenarios.fitted_spline import (
-    CurveSamples,
-    Misfit,
-    _band_solved,
-    fitted,
-)
+from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, _band_solved, fitted
 
 HEADER = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"

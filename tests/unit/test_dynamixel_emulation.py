@@ -25,11 +25,7 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     EmulatedServo,
     ServoLine,
 )
-from uam_sim_bridge.devices.dynamixel.health import (
-    ERRORS,
-    advice,
-    hardware_errors,
-)
+from uam_sim_bridge.devices.dynamixel.health import ERRORS, advice, hardware_errors
 from uam_sim_bridge.devices.serial.serial_port import SerialPort
 from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, word
 

@@ -18,11 +18,7 @@ from uam_control.vehicle import load_description
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, describe_chain
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
-from uam_sim_bridge.devices.dynamixel.emulated import (
-    ArmShafts,
-    EmulatedServo,
-    ServoLine,
-)
+from uam_sim_bridge.devices.dynamixel.emulated import ArmShafts, EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory

@@ -7,12 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.mission import (
-    Mission,
-    MissionParameters,
-    StartParameters,
-    load_scenario,
-)
+from uam_control.mission import Mission, MissionParameters, StartParameters, load_scenario
 from uam_control.supervision import Authority, OperatorCommand, Readings, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])

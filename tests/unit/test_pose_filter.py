@@ -7,13 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.estimation.pose_filter import (
-    EstimatedMotion,
-    PoseFilter,
-    correct,
-    predict,
-    shift,
-)
+from uam_control.estimation.pose_filter import EstimatedMotion, PoseFilter, correct, predict, shift
 from uam_control.estimation.waiting import value_at
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -12,11 +12,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.loops.position_modes import (
-    PositionControl,
-    attitude_of,
-    limit_across,
-)
+from uam_sim_bridge.autopilot.loops.position_modes import PositionControl, attitude_of, limit_across
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import position_target, setpoint_message
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2

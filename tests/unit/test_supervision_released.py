@@ -7,14 +7,7 @@ import math
 import pytest
 from supervised import S500, flying, observation, watch, with_state
 
-from uam_control.supervision import (
-    Authority,
-    Guide,
-    OperatorCommand,
-    Readings,
-    State,
-    Supervisor,
-)
+from uam_control.supervision import Authority, Guide, OperatorCommand, Readings, State, Supervisor
 
 PILOT = Authority("the pilot, in POSITION")
 AIRBORNE = (State.FLYING, State.HOLDING, State.LANDING)

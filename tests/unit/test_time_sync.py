@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from uam_sim_bridge.mavlink.telemetry.time_sync import (
-    BEHIND,
-    RebootDetector,
-    TimeSync,
-    nanoseconds,
-)
+from uam_sim_bridge.mavlink.telemetry.time_sync import BEHIND, RebootDetector, TimeSync, nanoseconds
 
 
 def run(sync, seconds, start, offset, delay, back=None, lost=0.0, seed=1):

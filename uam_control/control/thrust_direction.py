@@ -13,18 +13,7 @@ import math
 
 import numpy as np
 
-from uam_control.coordinates import (
-    ATTITUDE,
-    CHI,
-    CHI_DDOT,
-    CHI_DOT,
-    PITCH,
-    ROLL,
-    YAW,
-    X,
-    Y,
-    Z,
-)
+from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.rotations import body_rates, thrust_attitude
 from uam_control.maths.vectors import Vector, cross, dot, minus, plus, times

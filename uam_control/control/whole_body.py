@@ -44,17 +44,7 @@ from uam_control.laws.whole_body import observe
 from uam_control.maths.compiled import jit
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.rotations import body_rates, matrix_from_euler
-from uam_control.maths.vectors import (
-    Vector,
-    cross,
-    dot,
-    minus,
-    plus,
-    rows,
-    times,
-    turned,
-    vector,
-)
+from uam_control.maths.vectors import Vector, cross, dot, minus, plus, rows, times, turned, vector
 
 UP = (0.0, 0.0, 1.0)
 

@@ -16,12 +16,7 @@ from uam_control.ages import AHEAD
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.estimation.base import Estimator
 from uam_control.estimation.estimator_parameters import OBSERVER, EstimatorParameters
-from uam_control.estimation.filters import (
-    derivative_step,
-    joint_step,
-    low_pass_step,
-    observer_step,
-)
+from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step, observer_step
 from uam_control.estimation.pose_clock import settled, suspend
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
@@ -36,11 +31,7 @@ from uam_control.estimation.pose_filter import (
 from uam_control.estimation.waiting import insert
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import record
-from uam_control.maths.rotations import (
-    euler_from_quaternion,
-    matrix_from_quaternion,
-    rotate_back,
-)
+from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion, rotate_back
 
 # rad/s; the noise of the estimated bias grows with the cube of the bandwidth
 QUIET_BANDWIDTH = 24.0

@@ -11,16 +11,7 @@ import math
 
 import numpy as np
 
-from uam_control.coordinates import (
-    ALPHA,
-    CHI,
-    CHI_DDOT,
-    CHI_DOT,
-    PITCH,
-    ROLL,
-    YAW,
-    X,
-)
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, X
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.rotations import rows_from_euler
 from uam_control.maths.vectors import cross, minus, product, transposed, turned, vector, write

@@ -11,18 +11,7 @@ import numpy as np
 
 from uam_control.arm.chain import Chain, carrying
 from uam_control.arm.kinematics import vehicle_dynamics
-from uam_control.coordinates import (
-    ALPHA,
-    ARM,
-    CHI,
-    CHI_DDOT,
-    CHI_DOT,
-    POSITION,
-    ROLL,
-    YAW,
-    X,
-    Z,
-)
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, ROLL, YAW, X, Z
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler
 from uam_control.maths.vectors import rows as matrix_rows

@@ -11,18 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from uam_control.coordinates import (
-    ALPHA,
-    ARM,
-    CHI,
-    CHI_DOT,
-    JERK,
-    POSITION,
-    YAW,
-    X,
-    Y,
-    Z,
-)
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DOT, JERK, POSITION, YAW, X, Y, Z
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import wrap_angle

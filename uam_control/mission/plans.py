@@ -12,15 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from uam_control.coordinates import (
-    ALPHA,
-    ARM,
-    CHI,
-    CHI_DDOT,
-    CHI_DOT,
-    POSITION,
-    YAW,
-)
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale

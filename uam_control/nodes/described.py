@@ -8,12 +8,7 @@ from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_s
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
-from uam_control.vehicle import (
-    DEFAULT_VEHICLE,
-    VehicleDescription,
-    VehicleError,
-    load_description,
-)
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError, load_description
 from uam_msgs_py.messages.navigation import hand_message
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 

@@ -13,13 +13,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from uam_control.offboard.modes import MavCmd, MavResult, result_word
-from uam_control.settings.parameter_set import (
-    ParameterError,
-    ParameterSet,
-    choice,
-    integer,
-    number,
-)
+from uam_control.settings.parameter_set import ParameterError, ParameterSet, choice, integer, number
 
 NONE, ACTUATOR, GRIPPER = "none", "actuator", "gripper"
 ACTUATORS = 6  # of one DO_SET_ACTUATOR

@@ -21,12 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.control.output_limits import (
-    ArmLimits,
-    AttitudeLimits,
-    PositionLimits,
-    RateLimits,
-)
+from uam_control.control.output_limits import ArmLimits, AttitudeLimits, PositionLimits, RateLimits
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, ROLL, YAW
 from uam_control.estimation import catalogue as estimators
 from uam_control.laws import catalogue

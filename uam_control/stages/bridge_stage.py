@@ -30,13 +30,7 @@ from uam_control.setpoints.rate_thrust_map import (
     rate_thrust_of_state,
     use_factor,
 )
-from uam_control.setpoints.setpoint_source import (
-    Setpoint,
-    SetpointSource,
-    Situation,
-    sent,
-    silent,
-)
+from uam_control.setpoints.setpoint_source import Setpoint, SetpointSource, Situation, sent, silent
 from uam_control.setpoints.setpoint_types import SetpointParameters, rates_setpoint
 from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
@@ -54,12 +48,7 @@ from uam_control.stages.flight_measurements import (
 )
 from uam_control.stages.step import ASK, DECIDE, DONE
 from uam_control.stages.supervisor_inputs import LIFT, keep
-from uam_control.stages.vision_pacing import (
-    VisionArrays,
-    VisionPacing,
-    VisionParameters,
-    pose_due,
-)
+from uam_control.stages.vision_pacing import VisionArrays, VisionPacing, VisionParameters, pose_due
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 

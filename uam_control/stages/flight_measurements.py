@@ -12,13 +12,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI_DOT, ROLL
 from uam_control.maths.compiled import borrowing, prepared
-from uam_control.setpoints.loop_delay import (
-    DelayNumbers,
-    DelaySums,
-    LoopDelay,
-    follow,
-    pause,
-)
+from uam_control.setpoints.loop_delay import DelayNumbers, DelaySums, LoopDelay, follow, pause
 from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import (
     ThrustIdentification,

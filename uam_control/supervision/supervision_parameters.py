@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from uam_control import ages
-from uam_control.settings.parameter_set import (
-    ParameterError,
-    ParameterSet,
-    choice,
-    number,
-    vector,
-)
+from uam_control.settings.parameter_set import ParameterError, ParameterSet, choice, number, vector
 
 
 def _limit(reaction: str, default: float, what: str, unit: str, low: float, high: float) -> Any:

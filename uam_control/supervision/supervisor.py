@@ -19,13 +19,7 @@ from uam_control.coordinates import ATTITUDE, CHI, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import tilt
-from uam_control.supervision.checks import (
-    CONTRADICTION,
-    DELAYS,
-    POSES_OFF,
-    Checks,
-    ExceededLimit,
-)
+from uam_control.supervision.checks import CONTRADICTION, DELAYS, POSES_OFF, Checks, ExceededLimit
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand

@@ -27,11 +27,7 @@ from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, rea
 from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
-from uam_sim_bridge.devices.dynamixel.chain import (
-    SPEEDS,
-    ArmChain,
-    ArmError,
-)
+from uam_sim_bridge.devices.dynamixel.chain import SPEEDS, ArmChain, ArmError
 from uam_sim_bridge.devices.dynamixel.control_table import model_name
 from uam_sim_bridge.devices.dynamixel.driver import NEEDED_LATENCY, ArmDriver
 from uam_sim_bridge.devices.dynamixel.health import advice

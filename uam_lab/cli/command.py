@@ -12,13 +12,7 @@ from typing import TYPE_CHECKING, Any
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
-from uam_control.settings.parameter_set import (
-    Bound,
-    Choice,
-    ParameterSet,
-    Switch,
-    Text,
-)
+from uam_control.settings.parameter_set import Bound, Choice, ParameterSet, Switch, Text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription
 from uam_lab.experiments.workers.place import Workplace, cores
 from uam_lab.flights.flight_options import LAST_SEED

@@ -27,14 +27,7 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.cli.command import (
-    Command,
-    Subcommands,
-    chosen_effects,
-    count,
-    number,
-    place_of,
-)
+from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, number, place_of
 from uam_lab.experiments.compare import plan
 from uam_lab.experiments.trials.trial import TrialResult, result_rows
 from uam_lab.flights.conclude import command_line

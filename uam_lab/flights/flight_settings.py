@@ -12,22 +12,12 @@ from typing import Any
 from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
-from uam_control.profiles.profile import (
-    Profile,
-    complete_profile,
-    default_profile,
-    load_profile,
-)
+from uam_control.profiles.profile import Profile, complete_profile, default_profile, load_profile
 from uam_control.profiles.profile_fit import misfits
 from uam_control.setpoints.setpoint_types import WRENCH
 from uam_control.settings import configuration
 from uam_control.settings.process_parameters import ProcessParameters
-from uam_control.vehicle import (
-    POSITION_SERVO,
-    VehicleDescription,
-    chain_of,
-    load_description,
-)
+from uam_control.vehicle import POSITION_SERVO, VehicleDescription, chain_of, load_description
 from uam_lab.flights import clearance, node_options, plant_fit
 from uam_lab.flights.flight_options import (
     AUTOPILOT_IMU,

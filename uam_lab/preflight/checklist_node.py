@@ -33,13 +33,7 @@ from uam_lab.preflight.checklist.step import Step, StepState
 from uam_lab.preflight.checklist_feed import Feed
 from uam_lab.records.results.atomic import write_text
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import (
-    FAILED,
-    OPEN,
-    PASSED,
-    ChecklistItem,
-    checklist_message,
-)
+from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, checklist_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.answering import ServingExecutor

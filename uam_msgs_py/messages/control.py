@@ -19,11 +19,7 @@ from uam_control.coordinates import (
     arm_coordinates,
     coordinates,
 )
-from uam_msgs_py.messages.convert import (
-    CommandWriter,
-    TrajectoryReader,
-    TrajectoryWriter,
-)
+from uam_msgs_py.messages.convert import CommandWriter, TrajectoryReader, TrajectoryWriter
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import Serialized
 

@@ -20,16 +20,7 @@ import ctypes
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
-from ctypes import (
-    POINTER,
-    c_bool,
-    c_int,
-    c_int64,
-    c_size_t,
-    c_uint8,
-    c_uint64,
-    c_void_p,
-)
+from ctypes import POINTER, c_bool, c_int, c_int64, c_size_t, c_uint8, c_uint64, c_void_p
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription

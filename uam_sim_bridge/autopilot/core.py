@@ -15,13 +15,7 @@ import numpy as np
 from uam_control.maths.compiled import prepared
 from uam_control.maths.memory import Known, Number, record
 from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
-from uam_control.offboard.modes import (
-    CUSTOM_MODE_ENABLED,
-    FORCE,
-    MavCmd,
-    MavResult,
-    Mode,
-)
+from uam_control.offboard.modes import CUSTOM_MODE_ENABLED, FORCE, MavCmd, MavResult, Mode
 from uam_control.setpoints.targets import (
     ATTITUDE_AND_YAW_RATE,
     RATES,
@@ -32,11 +26,7 @@ from uam_control.setpoints.targets import (
 from uam_control.vehicle import load_description
 from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
-from uam_sim_bridge.autopilot.autopilot_estimator import (
-    POSITION,
-    VELOCITY,
-    Estimator,
-)
+from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
 from uam_sim_bridge.autopilot.battery import SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.cycle import (

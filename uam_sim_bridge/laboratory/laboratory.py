@@ -29,11 +29,7 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
 )
 from uam_sim_bridge.devices.dynamixel.startup import required_mode
 from uam_sim_bridge.devices.mocap.calibration import Calibration
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
-    Disturbances,
-    MocapServer,
-    Streaming,
-)
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer, Streaming
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.laboratory.hil_line import HilLine

@@ -12,10 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, POSITION
-from uam_control.maths.rotations import (
-    matrix_from_quaternion,
-    quaternion_from_euler,
-)
+from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 
 # of the whole vehicle, 2.2 kg and 0.02 kg m^2: about 2 Hz, well damped
 STIFFNESS, DAMPING = 400.0, 50.0  # [N/m], [N s/m]

@@ -6,11 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from uam_control.offboard.autopilot_magnet import (
-    NONE,
-    AutopilotMagnet,
-    AutopilotMagnetParameters,
-)
+from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnet, AutopilotMagnetParameters
 from uam_control.offboard.firmware import Firmware
 from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters

@@ -14,14 +14,7 @@ from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.setpoint_types import SetpointParameters
 from uam_control.setpoints.thrust_identification import ThrustIdentificationParameters
 from uam_control.settings.parameter_file import ProfileError
-from uam_control.settings.parameter_set import (
-    ParameterSet,
-    choice,
-    integer,
-    number,
-    switch,
-    text,
-)
+from uam_control.settings.parameter_set import ParameterSet, choice, integer, number, switch, text
 from uam_control.settings.process_parameters import (
     DeviceWait,
     ProcessParameters,

@@ -59,14 +59,8 @@ from uam_msgs_py.node.tick_times import DECODE, STAGE
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
-from uam_sim_bridge.nodes.autopilot_topics import (
-    WAKE_UP as IMU_WAKE_UP,
-)
-from uam_sim_bridge.nodes.autopilot_topics import (
-    AutopilotImuTopic,
-    AutopilotTopics,
-    CompanionClock,
-)
+from uam_sim_bridge.nodes.autopilot_topics import WAKE_UP as IMU_WAKE_UP
+from uam_sim_bridge.nodes.autopilot_topics import AutopilotImuTopic, AutopilotTopics, CompanionClock
 from uam_sim_bridge.nodes.bridge_link import bridge_magnet, open_links
 from uam_sim_bridge.nodes.bridge_parameters import BridgeParameters
 from uam_sim_bridge.nodes.fault_topic import FaultTopic

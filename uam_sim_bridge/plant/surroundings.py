@@ -10,12 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from uam_control.mission.scenarios.environment import (
-    PAYLOAD,
-    board_height,
-    material,
-    thickness,
-)
+from uam_control.mission.scenarios.environment import PAYLOAD, board_height, material, thickness
 from uam_sim_bridge.plant.arm_geometry import BASE
 
 PLACE = "environment"  # body of parts/world.xml, before the vehicle: its contacts come first

@@ -32,13 +32,7 @@ from uam_control.coordinates import (
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
-from uam_control.mission.scenarios.hand_motion import (
-    BEFORE,
-    Task,
-    Unreachable,
-    following,
-    holding,
-)
+from uam_control.mission.scenarios.hand_motion import BEFORE, Task, Unreachable, following, holding
 from uam_control.mission.scenarios.ramps import at_rest
 from uam_control.mission.scenarios.reference_kinds import Middle, cut, keys_of, legs
 from uam_control.mission.scenarios.route import Leg

@@ -16,16 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.arm.hand import ELEVATION, HEADING, hands, jacobians, least_change
-from uam_control.coordinates import (
-    ALPHA,
-    ARM,
-    CHI,
-    CHI_DDOT,
-    PITCH,
-    POSITION,
-    ROLL,
-    YAW,
-)
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, PITCH, POSITION, ROLL, YAW
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.mission.motion.polynomials import Polynomials

@@ -13,11 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import CHI_DDOT, POSITION, YAW, Z
-from uam_control.mission.motion.polynomials import (
-    Polynomials,
-    added,
-    ramp_up,
-)
+from uam_control.mission.motion.polynomials import Polynomials, added, ramp_up
 from uam_control.mission.scenarios.scenario_options import ScenarioOptions
 from uam_control.vehicle import GRAVITY
 

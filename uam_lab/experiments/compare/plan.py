@@ -9,12 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profiles.profile import (
-    Profile,
-    default_profile,
-    load_profile,
-    profile_of,
-)
+from uam_control.profiles.profile import Profile, default_profile, load_profile, profile_of
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.trial import Trial
 from uam_lab.records.results.timeseries import SUBSYSTEMS

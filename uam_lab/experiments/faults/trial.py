@@ -8,13 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from uam_lab.experiments.faults.matrix import Cell
-from uam_lab.experiments.trials.outcome import (
-    COMPLETED,
-    LOST,
-    classify,
-    down_after,
-    ending,
-)
+from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify, down_after, ending
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, fly
 from uam_lab.records.results.outcome import Outcome

@@ -23,10 +23,7 @@ from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
-from uam_lab.flights.rehearsal.laboratory_process import (
-    LABORATORY,
-    LABORATORY_MODULE,
-)
+from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import logged
@@ -36,12 +33,7 @@ from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import settings_of
 from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse, start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
-from uam_lab.records.recording.logged_topics import (
-    LABORATORY_FILE,
-    Log,
-    latencies,
-    statistics,
-)
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies, statistics
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, write_json
 from uam_msgs_py.node import wiring

@@ -28,12 +28,7 @@ from uam_lab.records.recording.logged_topics import ADAPTATION, Log, StampedRows
 from uam_lab.records.recording.mcap_reader import UnreadableLog
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.outcome import Outcome, grasp_decision, transition
-from uam_lab.records.results.timeseries import (
-    SUBSYSTEMS,
-    Columns,
-    FlightTable,
-    gain_columns,
-)
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Columns, FlightTable, gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.flight_events import FaultEvent, ParameterChange
 from uam_msgs_py.messages.status import MissionStatus

@@ -23,12 +23,7 @@ from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel import startup
 from uam_sim_bridge.devices.dynamixel.budget import GRIPPER_GOAL, Budget, budget
 from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
-from uam_sim_bridge.devices.dynamixel.chain import (
-    GRIPPER,
-    ArmChain,
-    ArmError,
-    ServoDescription,
-)
+from uam_sim_bridge.devices.dynamixel.chain import GRIPPER, ArmChain, ArmError, ServoDescription
 from uam_sim_bridge.devices.dynamixel.goals import Command, goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.health import CycleMeter, ServoHealth
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters

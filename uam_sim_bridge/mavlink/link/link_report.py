@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.telemetry.vitals import (
-    ESTIMATOR_FLAGS,
-    estimate_faults,
-    names,
-)
+from uam_sim_bridge.mavlink.telemetry.vitals import ESTIMATOR_FLAGS, estimate_faults, names
 
 
 def report(link: OffboardLink) -> dict[str, str | int | None]:

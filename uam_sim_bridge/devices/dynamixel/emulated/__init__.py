@@ -2,9 +2,4 @@
 
 from uam_sim_bridge.devices.dynamixel.emulated.line import BusFaults, EmulatedBus, ServoLine
 from uam_sim_bridge.devices.dynamixel.emulated.servo import EmulatedServo
-from uam_sim_bridge.devices.dynamixel.emulated.shafts import (
-    ArmShafts,
-    Drive,
-    JointShaft,
-    Shaft,
-)
+from uam_sim_bridge.devices.dynamixel.emulated.shafts import ArmShafts, Drive, JointShaft, Shaft
