@@ -14,7 +14,9 @@ from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParam
 from uam_control.setpoints.targets import AttitudeTarget, WrenchTarget
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
+from uam_sim_bridge.autopilot.autopilot_estimator import POSITION
 from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.loops.position_modes import PositionModes
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, wrench_target
 
@@ -409,3 +411,17 @@ def test_a_wrench_drives_the_motors_without_a_rate_loop():
     assert np.diff(rolls[12:]).mean() / 0.004 == pytest.approx(expected, rel=0.1)
     bench.run(0.5, ((0, 0, 0), HOVER))
     assert abs(bench.body.gyro[0]) < 0.2
+
+
+def test_return_that_has_begun_to_land_goes_on_beside_its_home():
+    modes, place = PositionModes(Parameters.of(load_description())), np.zeros(10)
+    place[0] = 1.0
+    sinks = []
+    for mode, north in [(Mode.RETURN, 0.5), (Mode.RETURN, 0.2), (Mode.RETURN, 0.5)] + [
+        (Mode.POSITION, 0.2),
+        (Mode.RETURN, 0.5),
+    ]:
+        place[POSITION] = north, 0.0, -1.0
+        modes.update(mode, place, 0.004, 0.5)
+        sinks.append(modes.sinking)
+    assert sinks == [False, True, True, False, False]

@@ -201,7 +201,7 @@ class PositionModes:
         if mode is not self._mode:
             self._mode, self._held = mode, position + _BRAKING * velocity
             self._yaw = float(euler_from_quaternion(estimate[ATTITUDE])[2])
-            self._integral[:] = 0.0
+            self._integral[:], self.sinking = 0.0, False
         desired = self._desired_velocity(mode, position, dt)
         error = desired - velocity
         self._integral += self._integral_gain * error * dt
@@ -211,13 +211,12 @@ class PositionModes:
 
     def _desired_velocity(self, mode: Mode, position: np.ndarray, dt: float) -> np.ndarray:
         """Return the desired velocity (3,) [m/s, NED]; moves the held position."""
-        p, self.sinking, self.climbing = self._parameters, False, False
+        p, lands, self.sinking, self.climbing = self._parameters, self.sinking, False, False
         speed, vertical = p["MPC_VEL_MANUAL"], np.zeros(3)
         if mode is Mode.RETURN:
             away = self.home[:2] - position[:2]
             self._held[:2] = self.home[:2]
-            if math.hypot(*away) < _AT_HOME:
-                self.sinking = True
+            self.sinking = lands or math.hypot(*away) < _AT_HOME  # the ground may push it off
         moving = np.zeros(3)
         if mode is Mode.POSITION:
             sticks = np.where(np.abs(self.sticks) > _STICK_ZERO, self.sticks, 0.0)
