@@ -73,8 +73,8 @@ end:
 _GUARD_OWNER: list[object] = []  # of its machine code: it stays until the process ends
 
 
-def _guarded_step() -> Callable[[int, int], int]:
-    """Return mj_step(model, data), for compiled functions or for plain Python."""
+def _compiled_step() -> Callable[[int, int], int]:
+    """Return mj_step(model, data) for compiled functions."""
     from llvmlite import binding
     from numba import types
 
@@ -84,15 +84,33 @@ def _guarded_step() -> Callable[[int, int], int]:
     machine = binding.Target.from_default_triple().create_target_machine()
     _GUARD_OWNER.append(binding.create_mcjit_compiler(binding.parse_assembly(_GUARD), machine))
     _GUARD_OWNER[0].finalize_object()
-    address = _GUARD_OWNER[0].get_function_address(_NAME)
-    if not compiled.active():
-        return ctypes.PYFUNCTYPE(*[ctypes.c_size_t] * 3)(address)
-    binding.add_symbol(_NAME, address)
+    binding.add_symbol(_NAME, _GUARD_OWNER[0].get_function_address(_NAME))
     return types.ExternalFunction(_NAME, types.intp(types.intp, types.intp))
 
 
+def _plain_step() -> Callable[[int, int], int]:
+    """Return mj_step(model, data) for plain Python, where an internal error ends the process."""
+    library = ctypes.CDLL(_LIBRARY)
+    library.mj_step.argtypes, library.mj_step.restype = [ctypes.c_void_p] * 2, None
+    message = ctypes.create_string_buffer(1024)
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_char_p)
+    def warned(text: bytes) -> None:
+        message.value = text[:1023]
+
+    handler = ctypes.c_void_p.in_dll(library, "mju_user_warning")
+
+    def step(model: int, data: int) -> int:
+        message.value, handler.value = b"", ctypes.cast(warned, ctypes.c_void_p).value
+        library.mj_step(model, data)
+        handler.value = None
+        return ctypes.addressof(message) if message.value else 0
+
+    return step
+
+
 # 0, or the address of the text of an error or warning, valid until the next one
-mj_step = _guarded_step()
+mj_step = _compiled_step() if compiled.active() else _plain_step()
 
 
 def failure(address: int, model: mujoco.MjModel) -> PhysicsError:
