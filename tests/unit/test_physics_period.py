@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uam_control.maths.compiled import active
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import load_description
@@ -101,6 +102,7 @@ def test_a_sample_is_never_overwritten():
         np.testing.assert_array_equal(array, was)
 
 
+@pytest.mark.skipif(not active(), reason="in plain Python it ends the process")
 @pytest.mark.parametrize("effects", [{}, {"rotor_spread": presets.laboratory()["rotor_spread"]}])
 def test_an_internal_error_of_mujoco_ends_the_flight_not_the_process(effects):
     scenario, vehicle = load_scenario("hover"), Vehicle.load().changed({"effects": effects})
