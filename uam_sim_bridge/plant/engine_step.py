@@ -99,9 +99,10 @@ def _plain_step() -> Callable[[int, int], int]:
         message.value = text[:1023]
 
     handler = ctypes.c_void_p.in_dll(library, "mju_user_warning")
+    ours = ctypes.cast(warned, ctypes.c_void_p)  # keeps the function
 
     def step(model: int, data: int) -> int:
-        message.value, handler.value = b"", ctypes.cast(warned, ctypes.c_void_p).value
+        message.value, handler.value = b"", ours.value
         library.mj_step(model, data)
         handler.value = None
         return ctypes.addressof(message) if message.value else 0

@@ -64,7 +64,7 @@ def following(task: Task, flyer: Flyer) -> Polynomials:
     It begins BEFORE the task and ends as long after it, at rest. Raises Unreachable.
     """
 
-    def corrected(chi: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
+    def corrected(chi: np.ndarray, _: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
         chi[:, POSITION] += _shifted(off[:, POSITION], flown, flyer)
         chi[:, YAW] += off[:, HEADING]
         if task.elevated:
@@ -82,9 +82,8 @@ def holding(task: Task, base: Polynomials, flyer: Flyer) -> Polynomials:
     columns = [YAW, *range(ALPHA, base.coefficients.shape[2])]
     kept = [*range(3), *[HEADING] * task.headed, *[ELEVATION] * task.elevated]
 
-    def corrected(chi: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
-        slopes = jacobians(flyer.chain, flown.chi, columns)[:, kept]
-        posture = _begun(task, flown.times, flyer)[:, columns]
+    def corrected(chi: np.ndarray, begun: np.ndarray, flown: Sampled, off: np.ndarray) -> None:
+        slopes, posture = jacobians(flyer.chain, flown.chi, columns)[:, kept], begun[:, columns]
         left = np.einsum("ijk,ik->ij", slopes, chi[:, columns] - posture)
         chi[:, columns] = posture + least_change(slopes, off[:, kept] + left)
 
@@ -95,16 +94,17 @@ def _solved(
     task: Task,
     flyer: Flyer,
     base: Polynomials | None,
-    corrected: Callable[[np.ndarray, Sampled, np.ndarray], None],
+    corrected: Callable[[np.ndarray, np.ndarray, Sampled, np.ndarray], None],
 ) -> Polynomials:
     """Return the motion whose hand is on the task, from the task's posture on.
 
-    base: where the base is, None: above the hand; corrected(chi, flown, off): corrects chi
-    (m, 6 + n) for a hand that is off by (m, 5).
+    base: where the base is, None: above the hand; corrected(chi, begun, flown, off): corrects chi
+    (m, 6 + n), which was begun with that of the posture, for a hand that is off by (m, 5).
     """
     for step in KNOTS:
         times = _grid(task.path, step / SAMPLES)
-        wanted, chi = _wanted(task, times), _begun(task, times, flyer)
+        wanted = _wanted(task, times)
+        chi = begun = _begun(wanted, flyer)
         if base is None:
             chi[:, POSITION] -= hands(flyer.chain, _placed(chi))[:, POSITION]
         else:
@@ -118,7 +118,7 @@ def _solved(
             if least < CLOSE or (done >= FIRST and not least <= BETTER * before):
                 break
             chi = motion.rows(times, 1)[CHI]
-            corrected(chi, flown, off)
+            corrected(chi, begun, flown, off)
         misses = _missed(motion, task, flyer)
         if not misses:
             return motion
@@ -141,9 +141,9 @@ def _wanted(task: Task, times: np.ndarray) -> np.ndarray:
     return task.path.rows(times, 1)[CHI].copy()
 
 
-def _begun(task: Task, times: np.ndarray, flyer: Flyer) -> np.ndarray:
-    """Return chi (m, 6 + n) of level bases whose hand, in the posture, has the task's heading."""
-    chi = _wanted(task, times)
+def _begun(wanted: np.ndarray, flyer: Flyer) -> np.ndarray:
+    """Return chi (m, 6 + n) of level bases whose hand, in the posture, has the heading `wanted`."""
+    chi = wanted.copy()
     chi[:, PITCH] = 0.0  # the task's elevation
     level = _placed(chi)
     level[:, YAW] = 0.0
