@@ -5,8 +5,6 @@
 See docs/extending.md.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from importlib.util import find_spec

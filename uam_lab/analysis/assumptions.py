@@ -11,8 +11,6 @@
 | zeta_min > 0 | `zeta` |
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

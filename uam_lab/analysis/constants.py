@@ -9,8 +9,6 @@ sum nu_i K*_i^2, and with it the ultimate bound. `from_the_paper` evaluates the 
 eq. (11), products of norms, which are much larger.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.laws.modular import ModularParameters

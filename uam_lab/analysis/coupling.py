@@ -12,8 +12,6 @@ the magnet. What tau_j has of known loads (`Supply.known`: the weight, the arm's
 uncertainty: H_j does not contain it, and sigma_j = -Mbar_j^-1 E_j is the sigma_j of eq. (9), err1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -14,8 +14,6 @@ the paper's d. The payload is part of the magnet while the magnet carries it. M 
 reflected inertia of the servos (armature). Friction, drag and contacts are not in M, C, g.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

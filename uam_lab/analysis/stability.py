@@ -1,7 +1,5 @@
 """The whole analysis of one flight: `analyse`, and its result as the dictionary for JSON."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

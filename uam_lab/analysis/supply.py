@@ -1,7 +1,5 @@
 """The terms of tau_j and the forces of the actuators along a flight, per axis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Selection of the ticks for the analysis: airborne, thinned out, with or without payload."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

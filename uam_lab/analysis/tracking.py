@@ -1,7 +1,5 @@
 """Tracking errors of a flight by the law's definition, from the true or the estimated state."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

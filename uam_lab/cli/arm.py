@@ -11,8 +11,6 @@ examples:
 Torque stays off. Exit status: 0 as described, 1 not, 2 wrong use or no device.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math

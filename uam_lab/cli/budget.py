@@ -16,8 +16,6 @@ them. Nothing else should run on the machine.
 Exit status: 0 measured, 1 a flight was not completed, 2 wrong use.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from dataclasses import replace

@@ -21,8 +21,6 @@ summary.md, campaign.json, campaign.png, and every flight in flights.parquet and
 same seed gives the same flights on any number of workers; more --flights only add some.
 """
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from collections.abc import Sequence

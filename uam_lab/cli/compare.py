@@ -16,8 +16,6 @@ Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparis
 The baselines are reconstructions (docs/law.md). The same command gives the same tables.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from uam_control.laws import catalogue

@@ -12,8 +12,6 @@ examples:
 Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rich.text import Text

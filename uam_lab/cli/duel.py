@@ -12,8 +12,6 @@ examples:
 Results in --out: tables.md, flights.parquet. Deviations from the published tasks: docs/duel.md.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from uam_lab.cli.command import Command, Subcommands, count, place_of

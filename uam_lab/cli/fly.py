@@ -34,8 +34,6 @@ alpha_1,alpha_2 (SI, ENU). A scenario that exceeds a limit of the vehicle is ref
 Exit status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 from collections.abc import Iterable

@@ -14,8 +14,6 @@ base frame, FLU (x forward, y left, z up). fk computes angles beyond a joint's r
 it; ik stays within. Exit status 1: ik: the arm does not reach the place; the nearest is printed.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

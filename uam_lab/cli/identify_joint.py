@@ -13,8 +13,6 @@ the torque constant visible (its weight is the reference). Results in --out: ide
 Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no device.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import time

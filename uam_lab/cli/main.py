@@ -4,8 +4,6 @@ A flight's nodes are forked from a process that takes seconds to load. It starts
 loads the command.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -15,8 +15,6 @@ The model is linear, around hover; docs/tuning.md. Results in --out: margins.md,
 bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong use.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Terminal, pipe or file that the commands print to: what is wrong with it ends no flight."""
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

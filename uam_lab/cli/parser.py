@@ -1,7 +1,5 @@
 """Parser of the command `uam`: one module of this package per subcommand."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import importlib

@@ -12,8 +12,6 @@ Adapted gains, filters and the desired attitude stay unchanged; the outputs chan
 gains act on the same errors (docs/tuning.md). The log records every change.
 """
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

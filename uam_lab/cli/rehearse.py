@@ -16,8 +16,6 @@ The same nodes, drivers and lab file as uam vehicle; only the names of the devic
 Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from dataclasses import replace

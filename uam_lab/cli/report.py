@@ -11,8 +11,6 @@ examples:
   uam report results/a results/b           both flights in the same figures
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

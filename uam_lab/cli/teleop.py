@@ -10,8 +10,6 @@ examples:
 A key moves the hand while it is held; without one the hand stops. x or Ctrl-C ends.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 

@@ -19,8 +19,6 @@ the cost. Results in --out: best.yaml (for uam fly --profile), search.png, evalu
 study.journal.
 """
 
-from __future__ import annotations
-
 import argparse
 import signal
 import sys

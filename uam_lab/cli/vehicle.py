@@ -17,8 +17,6 @@ nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/har
 status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 130 ended by Ctrl-C.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import getpass

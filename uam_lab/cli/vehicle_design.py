@@ -13,8 +13,6 @@ uam fly --vehicle my/quad.yaml. The margins are those of uam margins. Exit statu
 2 wrong use, or no gains keep the margins.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

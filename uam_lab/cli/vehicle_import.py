@@ -19,8 +19,6 @@ docs/your_vehicle.md. Exit status: 0 written, 2 wrong use or a description that 
 and line.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

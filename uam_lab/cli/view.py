@@ -13,8 +13,6 @@ The 3-D scene needs the node `scene`: uam fly starts it, otherwise ros2 run uam_
 Ctrl-C ends the cockpit; the flight continues.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """The charts of the page: strip charts of the last seconds, and the messages with their data."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

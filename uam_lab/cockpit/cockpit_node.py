@@ -1,7 +1,5 @@
 """Node: the cockpit, a local web page; see uam_lab.cockpit. No other node waits for it."""
 
-from __future__ import annotations
-
 import queue
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The commands of the page: what each calls, and whether the flight's state allows it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Fields and sliders for every parameter of a node, with active values and refusals."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The hand's goal in the scene: a marker to drag, whether it can be reached, and a button to go."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

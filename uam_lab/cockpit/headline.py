@@ -1,7 +1,5 @@
 """The headline of the page: state of the vehicle, phase, tracking errors; and the checklist."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """The page: headline and buttons left, the scene, charts and gains right."""
 
-from __future__ import annotations
-
 import math
 import queue
 import time

@@ -11,8 +11,6 @@ simulated flight every publisher counts its subscribers. This node must not be c
 another, so it subscribes to the topics of the control loop only after the mission's first status.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass

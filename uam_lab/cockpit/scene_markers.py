@@ -3,8 +3,6 @@
 A marker in a moving frame moves with /tf; it is sent again only when it changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

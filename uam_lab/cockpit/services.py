@@ -1,7 +1,5 @@
 """Asynchronous service calls: a callback gets the response, or the reason of a failure."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 viser's Markdown lets raw HTML through: the page has none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from markupsafe import Markup, escape

@@ -1,7 +1,5 @@
 """State of the vehicle from the status messages of its nodes, for the page's headline."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The 3-D scene: frames of /tf, the robot's shapes in them, and the markers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Subscriptions of the page: polled for the newest message of each topic, without callbacks."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

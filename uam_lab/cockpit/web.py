@@ -4,8 +4,6 @@ The websocket server answers GET only. A command is therefore a GET with a heade
 another origin cannot send, and with the secret of this page.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io

@@ -3,8 +3,6 @@
 On the ground its arm is above its feet, and beside what stands around it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

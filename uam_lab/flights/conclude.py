@@ -1,7 +1,5 @@
 """After a flight: complete the result folder with table, facts and metrics."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from typing import Any

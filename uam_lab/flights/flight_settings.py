@@ -1,7 +1,5 @@
 """Settings of a flight: the options of the command line, checked before anything starts."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from collections.abc import Sequence

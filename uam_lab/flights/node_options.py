@@ -1,7 +1,5 @@
 """Parameters and remappings of single nodes, and changes of a vehicle's numbers, checked."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from copy import deepcopy

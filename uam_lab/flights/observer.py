@@ -1,7 +1,5 @@
 """Progress of a flight for those who watch it: status, messages."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

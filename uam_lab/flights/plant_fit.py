@@ -1,7 +1,5 @@
 """Whether the effects of a plant fit vehicle and profile: their sizes are those of another one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """What a description cannot hold: taken from answers, asked at the terminal, or assumed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Masses, shapes and places of the links, from the model of the file."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """From a description to the folder of a vehicle: MJCF, YAML, picture, and what was assumed."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

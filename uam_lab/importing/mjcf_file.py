@@ -1,7 +1,5 @@
 """MJCF: read by MuJoCo; lines of its parts, and what its actuators say of rotors and joints."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

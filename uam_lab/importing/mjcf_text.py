@@ -1,7 +1,5 @@
 """The vehicle's MJCF: base and arm of the file as bodies of this project, and its own magnet."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The numbers of the vehicle's YAML file, each with its origin."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Rotors of a description: their places and turns, and what the file says of their thrust."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The file that is imported: its model in MuJoCo, and the line of each of its parts."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How the vehicle stands: ranges of the joints, the stowed arm, and the feet."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass

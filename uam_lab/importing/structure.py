@@ -1,7 +1,5 @@
 """The parts of a vehicle in a model: base, arm, end effector, rotors. Found, or refused by name."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field

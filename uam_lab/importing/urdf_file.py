@@ -1,7 +1,5 @@
 """URDF: checked by name and line, and made readable for MuJoCo."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

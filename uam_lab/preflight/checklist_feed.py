@@ -1,7 +1,5 @@
 """What the checklist reads of a vehicle: polled topics → observation and samples."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

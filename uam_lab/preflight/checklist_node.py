@@ -4,8 +4,6 @@ It reads the vehicle, asks a person for motions, and publishes the result on /ua
 mission starts with `require_checklist` only when all items have passed.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable

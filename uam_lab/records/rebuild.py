@@ -1,7 +1,5 @@
 """Rebuild a result folder from its log alone: table, metrics, facts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ Log time is simulation time, with `simulated: false` wall time; see `recording/t
 A log is never overwritten.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Sequence

@@ -8,8 +8,6 @@
 | page | `pages.write_page` | report.html |
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Flies one layout of the nodes with measured ticks, and reads what was measured."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping

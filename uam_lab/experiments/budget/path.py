@@ -5,8 +5,6 @@ moment between the sensors' publication and the setpoint's belongs to one segmen
 node, a part of its tick, or its publication.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The budgets of a tick as a table, as JSON and as stacked bars."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A scenario of any duration: the vehicle flies to and fro and moves its arm."""
 
-from __future__ import annotations
-
 import math
 
 import yaml

@@ -1,7 +1,5 @@
 """Results of `uam campaign`: success rate, errors, slices by each drawn value, worst flights."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

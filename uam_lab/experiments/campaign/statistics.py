@@ -1,7 +1,5 @@
 """Shares and percentiles of many flights, with confidence bands of 95 %."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Random variations of the nominal flight, for robustness statistics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

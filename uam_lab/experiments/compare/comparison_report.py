@@ -1,7 +1,5 @@
 """Results of `uam compare`: tables, figures, every flight, one page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

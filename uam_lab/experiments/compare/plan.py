@@ -1,7 +1,5 @@
 """The flights of a comparison."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field

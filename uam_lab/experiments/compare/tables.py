@@ -1,7 +1,5 @@
 """The paper's three tables of RMS errors, from the results of many flights."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The criteria of a design: config/design/criteria.yaml, single entries replaced by a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """The files of a design: profile, gains of the autopilot, pictures of its margins; its table."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path

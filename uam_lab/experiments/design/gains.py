@@ -11,8 +11,6 @@ measured body rates cancel in the setpoint (docs/tuning.md). 1 + d is bisected: 
 time, noise and torque allow. Where less than 1 is allowed, d = 0 and the loop is slower.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ the payload; that of a joint larger, where its gain may not fall enough: an upri
 All loops are judged together, because each closes around the others.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 The tables are Markdown: flown (published), per row and task.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ With `draws` the flights are random ones of the matrix: one or two of its faults
 moments, with one of its durations. A value [low, high] in the file is drawn between both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One rehearsal of a matrix of cable faults, and its result."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from dataclasses import dataclass, replace

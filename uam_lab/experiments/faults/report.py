@@ -1,7 +1,5 @@
 """Results of `uam faults`: every flight as CSV; the matrix as Markdown, picture and page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """One flight of a fault matrix, and its result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

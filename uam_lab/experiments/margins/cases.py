@@ -4,8 +4,6 @@ And whether a vehicle has the margins that the profile which flies it counts on:
 limit of late setpoints is the profile's `delay_margin`, with less in the vehicle it acts too late.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Adapted gains for the linear model: those of the profile, and those of a flight."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.laws import catalogue

@@ -9,8 +9,6 @@
 | hand | the correction of the arm's reference, if the hand is stabilised: delay margin only |
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Sequence

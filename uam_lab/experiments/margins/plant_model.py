@@ -7,8 +7,6 @@ oscillation of the speed amplitude V as a damping of 4 F / (pi V) (describing fu
 has that of V = SLIDING, or none.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The latency of motion capture is in no other loop: while IMU and poses agree, th
 depend on it. An error of the estimate decays through the poses, and their latency acts there.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

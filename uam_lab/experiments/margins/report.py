@@ -1,7 +1,5 @@
 """The margins of several cases as a table, as JSON, and as Bode and step plots."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict

@@ -11,8 +11,6 @@
 | rotors, rigid bodies, servos | `plant_model` |
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

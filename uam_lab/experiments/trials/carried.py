@@ -6,8 +6,6 @@ Names in config/ need nothing: every worker has the same configuration (`workers
 scenario that is a file travels as it was read, a model of the user as its files.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os

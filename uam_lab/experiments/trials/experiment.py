@@ -3,8 +3,6 @@
 They are flown by workers, or one after another in this process where they need nodes.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace

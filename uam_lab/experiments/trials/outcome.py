@@ -1,7 +1,5 @@
 """Outcome of a flight: one of five classes, and why."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One flight of an experiment, in either engine, and its result."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ that it dominates, from REFERENCE on. A search has converged when its last evalu
 result, the least cost or this area, by less than a share.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -7,8 +7,6 @@ The study is stored in a journal file in the result folder, or in the database o
 several machines can use. The storage contains every evaluation, so a stopped search can continue.
 """
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from collections.abc import Callable

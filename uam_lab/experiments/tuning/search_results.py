@@ -1,7 +1,5 @@
 """Results of a search: the best profile as a ROS parameter file, every evaluation, a plot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is the same in all processes that fly one campaign: versions, sources, configuration."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 from collections.abc import Mapping

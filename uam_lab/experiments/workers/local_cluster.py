@@ -1,7 +1,5 @@
 """Worker processes of this machine: Dask's scheduler in this process, one thread in each worker."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """Where the work is done; imported by every command, so without Dask."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """One flight of the direct engine, with progress and outcome."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -4,8 +4,6 @@ One pass of the loop is one control tick, in the order of a lockstep flight with
 stages of `ControlTick`, autopilot, physics. Most passes are compiled, see `compiled_ticks`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

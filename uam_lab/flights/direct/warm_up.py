@@ -4,8 +4,6 @@ The compiled functions are kept on disk beside their sources (see uam_control.ma
 all of them are there and up to date, nothing is compiled.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator

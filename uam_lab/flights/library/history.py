@@ -1,7 +1,5 @@
 """What a flight has reported so far, and waiting for what it will report."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -9,8 +9,6 @@ sends itself SIGINT, and SIGKILL after GRACE. Unlike PR_SET_PDEATHSIG with SIGKI
 every system and lets the recorder close its file.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import ctypes

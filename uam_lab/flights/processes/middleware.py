@@ -3,8 +3,6 @@
 rcl ends the process if it is not, with its own words; this is known before.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Environment variables of a flight's processes: a private ROS domain on this machine."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys

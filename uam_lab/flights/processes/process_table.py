@@ -3,8 +3,6 @@
 Of other users the processes are seen by root only.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path

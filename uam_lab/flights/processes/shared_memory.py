@@ -1,7 +1,5 @@
 """Room in /dev/shm: a process that finds none when it touches its memory there ends with SIGBUS."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import psutil

@@ -4,8 +4,6 @@ Signals stop whole processes only. The kernel continues the threads when the tra
 a crash. A traced process can be killed and interrupted as usual.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

@@ -1,7 +1,5 @@
 """What the devices of a rehearsal carried: rates and latencies, from /diagnostics in its log."""
 
-from __future__ import annotations
-
 import json
 import socket
 from collections.abc import Iterable, Iterator, Mapping

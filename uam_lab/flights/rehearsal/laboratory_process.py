@@ -5,8 +5,6 @@ That file is the given one, with the names of its devices replaced.
 The autopilot is the stand-in, or a PX4 in HITL with both of its lines as pseudo-terminals.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Result of a flight with the ROS engine, from its log and the statistics of the nodes."""
 
-from __future__ import annotations
-
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.processes.processes import NodeFailed
 from uam_lab.records.recording.log_reader import read_flight

@@ -1,7 +1,5 @@
 """The processes of a flight with the ROS engine: modules, parameters, autopilot's arguments."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

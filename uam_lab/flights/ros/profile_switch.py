@@ -5,8 +5,6 @@ node receives its values in one request and applies them between two ticks. If a
 refuses or does not answer, the others get their old values back.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Collection, Mapping

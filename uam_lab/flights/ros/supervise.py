@@ -3,8 +3,6 @@
 Its status comes by two topics, twice a second.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -3,8 +3,6 @@
 For each: whether it is there, else what is missing and how to check it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 

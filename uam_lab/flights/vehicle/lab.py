@@ -1,7 +1,5 @@
 """What a lab file describes: vehicle, flight, room and devices of one laboratory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Names of files in a lab file are relative to it, those of config/ need no folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

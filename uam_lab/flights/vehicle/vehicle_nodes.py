@@ -1,7 +1,5 @@
 """The nodes of a vehicle: modules, parameters, and who publishes what in place of the plant."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from uam_control.offboard.autopilot_magnet import NONE

@@ -1,7 +1,5 @@
 """The automatic items: functions of an observation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

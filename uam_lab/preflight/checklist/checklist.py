@@ -6,8 +6,6 @@ together give the permission; it is taken back when an automatic item fails, and
 Nothing changes while the vehicle is armed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime

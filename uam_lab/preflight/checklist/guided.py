@@ -1,7 +1,5 @@
 """The steps of the guided list, in order."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from uam_lab.preflight.checklist.limits import MotionLimits

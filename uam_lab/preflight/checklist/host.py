@@ -1,7 +1,5 @@
 """Readings of the companion computer."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

@@ -1,7 +1,5 @@
 """Limits of the checklist, parameters of its node. Their reasons: docs/preflight.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, number, switch

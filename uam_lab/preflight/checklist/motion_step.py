@@ -5,8 +5,6 @@ is judged as a whole: the tested axis, its sign, the other axes, the other senso
 wrong direction fails as soon as it is kept.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from enum import Enum

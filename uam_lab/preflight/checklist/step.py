@@ -1,7 +1,5 @@
 """One step of the guided list: what a person does, and its findings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -1,7 +1,5 @@
 """Checks of the autopilot: the one at a link, and an installation of PX4 in software."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Checks of the devices of a lab file, without a flight: nothing is switched, no torque."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path

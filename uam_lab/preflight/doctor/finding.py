@@ -1,7 +1,5 @@
 """Result of a check: a verdict, one line with the finding, one line with advice."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

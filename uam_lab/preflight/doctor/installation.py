@@ -1,7 +1,5 @@
 """Checks of the installation: Python, packages, configuration, compiled control path."""
 
-from __future__ import annotations
-
 import platform
 import re
 import sys

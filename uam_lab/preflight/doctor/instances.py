@@ -1,7 +1,5 @@
 """Check of the instances (ports and ROS domains of a flight): which are free or in use."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks for leftovers of crashed flights: locks, and processes without their parent."""
 
-from __future__ import annotations
-
 import os
 import re
 import tempfile

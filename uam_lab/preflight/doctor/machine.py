@@ -1,7 +1,5 @@
 """Checks of the machine: cores, memory, and timer accuracy for `--clock realtime`."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 A child process renders the frame: MUJOCO_GL=egl python -m uam_lab.preflight.doctor.rendering
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

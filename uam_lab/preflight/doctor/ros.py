@@ -4,8 +4,6 @@ The two processes are `python -m uam_lab.preflight.doctor.ros answer` and `ask`.
 in the ROS domain of their environment.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import statistics

@@ -1,7 +1,5 @@
 """Run all groups of checks in order; overall verdict and JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module

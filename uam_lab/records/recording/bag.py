@@ -5,8 +5,6 @@ Source: ros2/rosbag2, branch jazzy, rosbag2_storage/src/rosbag2_storage/qos.cpp 
 include/rosbag2_storage/yaml.hpp.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

@@ -4,8 +4,6 @@ The log ends at its size limit or after a write error. The messages before that 
 the recorder continues without the log.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -8,8 +8,6 @@
 The recorder writes them first, so that the log of a killed flight also contains them.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Mapping

@@ -7,8 +7,6 @@ has the last value before it, as in the receiving nodes. Ticks whose state and r
 process did not send (`inner_rate`) are left out: their errors would contain the motion since.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise

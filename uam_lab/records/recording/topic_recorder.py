@@ -17,8 +17,6 @@ are wall time.
 keeps the frames, status names and loggers of its namespace.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from bisect import bisect_right

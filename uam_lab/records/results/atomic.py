@@ -1,7 +1,5 @@
 """Atomic writing of files: an interrupted flight leaves no incomplete file."""
 
-from __future__ import annotations
-
 import csv
 import os
 from collections.abc import Iterable, Iterator

@@ -4,8 +4,6 @@ A hand that hangs on a hinge is where the recorded hinge has it. The reference i
 mission's reference: of its base in the attitude that its acceleration needs, and of its arm.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.arm.hand import HEADING, hands

@@ -5,8 +5,6 @@ Errors are truth minus reference; on a vehicle, which has no truth, estimate min
 command to the touchdown command (`Series.flown`); every control tick weighs the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Result of a flight, the same for both engines, and what completes its result folder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

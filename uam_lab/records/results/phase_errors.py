@@ -5,8 +5,6 @@ from the shoulder to the end effector: Suarez, Vega, Ollero 2020, "Benchmarks fo
 manipulation" (RA-L).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

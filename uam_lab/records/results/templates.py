@@ -1,7 +1,5 @@
 """HTML pages from templates, pictures as data URIs, Markdown tables."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Sequence
 from functools import cache

@@ -3,8 +3,6 @@
 Everything that the commands print goes through `say`, or through a `Terminal` of rich.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Result of a flight as texts and rows, for the page and the console."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The paper's RMS errors: tables table:error_p, table:error_q, table:error_alpha; proposed law."""
 
-from __future__ import annotations
-
 SCENARIO = "pick_and_place"  # the mission of the figures
 RMS = {
     "position_m": (0.05, 0.02, 0.09),

@@ -1,7 +1,5 @@
 """The flown parameters beside the paper's Table I, active safeguards, and changes in flight."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path

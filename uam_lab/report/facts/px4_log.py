@@ -4,8 +4,6 @@ Our names, frames (ENU, FLU) and units; time: mission time [s]. The two clocks a
 setpoints, which both sides log: the lag of the largest correlation.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Texts and rows of stability.json for the page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Injected faults of a flight: shaded in the figures, listed on the page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

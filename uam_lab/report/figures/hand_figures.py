@@ -1,7 +1,5 @@
 """The end effector: path against reference, error over time, workspace."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Picture of an identified joint: friction torque over velocity, measured and fitted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Side view of the mission: paths in the x-z plane with poses of vehicle and arm."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Figure: what PX4 logged beside our log."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Colours and fonts of all figures; writing of a figure, entries of a legend, small notes."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Lines, spans, polygons, texts, axes and legends are converted, so that each figure is drawn once.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import math

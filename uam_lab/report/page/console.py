@@ -1,7 +1,5 @@
 """Terminal output: progress of the report, and the table at the end of a flight."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path

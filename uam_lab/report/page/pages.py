@@ -1,7 +1,5 @@
 """report.html, of a flight or of several flights overlaid; it loads nothing from the network."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ MuJoCo reads MUJOCO_GL at import, so this runs in a separate process with MUJOCO
 `rendering`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache
