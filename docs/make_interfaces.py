@@ -15,8 +15,8 @@ USUAL = {"latched": 1}  # depths that are not written; else 32
 
 def table() -> str:
     """Return the table of all topics in Markdown, in the order of `topics`."""
-    lines = [HEAD, ("---",) * len(HEAD), *map(_row, topics.ALL)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    head, *rows = (f"| {' | '.join(line)} |\n" for line in (HEAD, *map(_row, topics.ALL)))
+    return f"{head}|{'---|' * len(HEAD)}\n{''.join(rows)}"
 
 
 def page(text: str) -> str:
