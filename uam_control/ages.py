@@ -5,8 +5,6 @@ the sample. Whoever judges a sample by its age takes the number from here: as it
 of a parameter.
 """
 
-from __future__ import annotations
-
 import math
 
 from uam_control.maths.compiled import borrowing

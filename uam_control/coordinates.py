@@ -20,8 +20,6 @@ derivatives. The base's desired attitude, body rates and their derivatives follo
 Compiled functions use the indices, for example state[CHI, ROLL]; numba compiles them as constants.
 """
 
-from __future__ import annotations
-
 CHI, CHI_DOT, CHI_DDOT = range(3)  # rows
 JERK, SNAP = 3, 4  # further rows of a motion
 MOTION_ROWS = 5

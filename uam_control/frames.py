@@ -10,8 +10,6 @@ its own inverse: one function serves both directions.
 Euler angles are Z-Y-X; quaternions are [w x y z], body → world.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

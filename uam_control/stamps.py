@@ -1,7 +1,5 @@
 """Conversion between stamps, integer nanoseconds [ns], and times of the maths, seconds [s]."""
 
-from __future__ import annotations
-
 SECOND = 1_000_000_000  # [ns]
 _MICROSECOND = 1_000  # [ns]
 NEW_TIME = SECOND  # [ns] a stamp that goes back by more belongs to a new simulation, not to jitter

@@ -21,8 +21,6 @@ Vectors and rotations are tuples, see `maths/vectors.py`; q (n,) and what is wri
 `has_hand` is 0 for an arm without an end effector.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

@@ -7,8 +7,6 @@ of mass, M_qq is the inertia of the joints and M_qw that between joints and base
     M_rho = M_qq,   N = M_rho^-1 M_qw,   M_r = M_ww - M_qw^T N
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

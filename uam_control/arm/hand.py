@@ -5,8 +5,6 @@ about its y axis (R = Rz(heading) Rx(lean) Ry(-elevation)). So both exist howeve
 are lost only where the tool's y axis stands upright.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

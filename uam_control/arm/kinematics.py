@@ -1,7 +1,5 @@
 """Where arm and end effector are, in the base frame (FLU), and torques and forces of a motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

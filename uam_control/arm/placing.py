@@ -5,8 +5,6 @@ change, where the base would leave its room, for elevation and lean of the tool,
 of a hand that hangs.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ so that a limit leaves no error behind. All of the force is scaled, so that its 
 with it the desired attitude.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ it uses only ||xi||, ||chi_ddot|| and ||chi_dot||. The parameter `law` selects t
 limits and weight are the same for all laws. No code here uses ROS.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ least change of the joints that closes the difference, by the damped Jacobian (N
 ones: the arm's own errors stay with its law.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Limits of the three controllers, the same for every law: parameters and maths."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Sample and hold: when a command that is computed at every tick is sent anew."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, prepared

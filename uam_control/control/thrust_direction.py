@@ -7,8 +7,6 @@ unchanged. The correction contains the noise of the position loop; a critically 
 filter gives it with two derivatives, without differentiating the noise.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ supervisor and bridge see three laws. Coordinates and inertia: `arm.floating`; d
 `laws.whole_body`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from operator import is_

@@ -1,7 +1,5 @@
 """What an estimator is: its parameters, the samples that it takes, the state that it gives."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

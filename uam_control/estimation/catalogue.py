@@ -1,7 +1,5 @@
 """All estimators by name. A new one is a file in this folder and an entry in `ESTIMATORS`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ rates, joint accelerations from the derivative of the joint velocities (paper, S
 low-pass filtered; the corner frequencies are parameters.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Parameters of the state estimator."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.estimation.base import BaseParameters

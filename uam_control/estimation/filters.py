@@ -1,7 +1,5 @@
 """Digital filters on vectors, advanced by one sample per call."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

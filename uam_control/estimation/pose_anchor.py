@@ -7,8 +7,6 @@ the vehicle flies smoothly into the frame that the odometry believes in. Roll an
 gravity and do not jump.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -11,8 +11,6 @@ that case motion capture and IMU contradict each other, and the estimated accele
 large: the gate then accepts all poses.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ stores the predicted poses, so that a measured pose is compared with the predict
 between two samples of the IMU, too. One that arrives before the IMU's sample waits for it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Samples by their stamps: those that wait for their turn, and the past of an estimate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.maths.compiled import jit

@@ -6,8 +6,6 @@ correction of the same error would follow every gust. It leaves out the path tha
 too: otherwise a vehicle that arrives just before the descent would count as beside the payload.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

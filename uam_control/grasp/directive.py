@@ -1,7 +1,5 @@
 """Steps of the grasp executive, its decisions about the payload, and its output."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple

@@ -6,8 +6,6 @@ and from the torque of the arm's first joint, each against its value before the 
 fused by their variances.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple, Protocol
 

@@ -5,8 +5,6 @@ of its path, and a path without the descent. A retreat runs the scenario back, s
 leaves payload and stand upwards on the way on which it came.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

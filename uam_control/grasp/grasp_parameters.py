@@ -1,7 +1,5 @@
 """Parameters of grasp and release, part of those of the mission node."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.ages import FORWARDED

@@ -1,7 +1,5 @@
 """The end effector in the world: its place now and in the last seconds, the levers of a weight."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Inputs of the grasp executive at one of its steps, and their running means."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ A rotor at its end shows late: the autopilot then takes thrust for its torques, 
 little, and the thrust that is sent rises to 1.
 """
 
-from __future__ import annotations
-
 import math
 
 from uam_control.grasp.grasp_parameters import GraspParameters

@@ -1,7 +1,5 @@
 """Times and directions of grasp and release in a scenario, from its moves and its gripper."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol

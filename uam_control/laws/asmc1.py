@@ -12,8 +12,6 @@ compensates the weight of the arm. For the attitude, e and e_dot are the errors 
 and (15). These equations are not in the paper.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, Self

@@ -18,8 +18,6 @@ of the arm. For the attitude, e and e_dot are the errors on SO(3), eq. (14) and 
 equations are not in the paper.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """All laws by name. A new law is a file in this folder and an entry in `LAWS`."""
 
-from __future__ import annotations
-
 from uam_control.laws.asmc1 import Asmc1Law
 from uam_control.laws.asmc2 import Asmc2Law
 from uam_control.laws.geometric import GeometricL1Law, GeometricLaw

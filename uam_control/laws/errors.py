@@ -5,8 +5,6 @@ e_q = 1/2 (R_d^T R - R^T R_d)^vee. Its rate has two forms: `lee` (default), Omeg
 or `printed`, eq. (15), rate of e_q (no label): q_dot - R_d^T R q_d_dot.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -18,8 +18,6 @@ L1 (after Wu et al., "L1 adaptive augmentation for geometric tracking control of
     tau gains -Mbar share C(s) sigma_hat,   C(s) = w / (s + w)
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Self

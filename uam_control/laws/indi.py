@@ -11,8 +11,6 @@ done. What disturbs, stays in tau_f: no integral of the error. It needs actuator
 it is: of the attitude, the setpoint type `wrench`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

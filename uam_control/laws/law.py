@@ -1,7 +1,5 @@
 """Base class of the laws: parameters, adapted gains, one compiled step per tick."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

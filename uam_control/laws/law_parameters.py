@@ -1,7 +1,5 @@
 """Parameters that all laws have, and the structured array that a compiled law reads."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, Self
 

@@ -5,8 +5,6 @@ err_variable_alpha. With diagonal lambda_1, lambda_2 and Q it splits into n equa
 A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

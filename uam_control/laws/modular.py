@@ -20,8 +20,6 @@ couplings between the subsystems, so the three parameter sets stay independent.
 `adapt_bias`. 0 is the printed law.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any, Self

@@ -13,8 +13,6 @@ tick, so the predictor's pole cancels). Two low-passes:
 The law takes d off force and torque of the base; what moves the hand counts with d_int.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ one number. It also checks only the file of a function, not the files of the fun
 constants that are compiled into it. Here the file name contains a digest of all these inputs.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator

@@ -8,8 +8,6 @@ A hook is a function of one tuple of arrays with its tuple, or a function of Pyt
 arguments. A call needs 3 ns, of a function of Python 70 ns more than the function itself.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, partial

@@ -1,7 +1,5 @@
 """Memory of a stage: named numbers, allocated once; Python and compiled functions use the same."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

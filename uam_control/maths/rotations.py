@@ -4,8 +4,6 @@ All rotate from the body frame (FLU) to the world frame (ENU), unless a docstrin
 The paper's R_B^W, eq. (3), rot_matrix, is `matrix_from_euler`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Vectors (3,) as tuples, matrices (3, 3) as tuples of rows: compiled maths without allocation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 There are no other transitions than those of `COURSES`. The arm has its own motion beside them.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Whether a vehicle can fly a reference, before it takes off: what exceeds a limit, and when."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property

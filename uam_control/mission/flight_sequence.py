@@ -1,8 +1,6 @@
 """The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed or aborted;
 the supervisor decides on all transitions."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -1,7 +1,5 @@
 """The compiled part of the guidance: the reference of a motion, and of motions computed ahead."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The vehicle and the ground: whether it stands again, and the pose that is followed there."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Each manoeuvre starts at the current reference with its rates and accelerations,
 of the controllers never jumps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -4,8 +4,6 @@ A command is checked here and done by the next step. For compiled ticks: when th
 sequence, and on which arrays.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -1,7 +1,5 @@
 """Output of the mission at one tick, and the names of its phases."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

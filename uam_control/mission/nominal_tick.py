@@ -1,7 +1,5 @@
 """A tick of the mission in which nothing is decided, compiled: the reference follows the path."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Connects the grasp executive with a flight: its inputs, and its effect on the path."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from functools import partial

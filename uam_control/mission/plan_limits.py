@@ -1,7 +1,5 @@
 """Limits that a plan keeps from its begin to its end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW

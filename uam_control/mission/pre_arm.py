@@ -3,8 +3,6 @@
 The permission is that of the checklist, see docs/preflight.md.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

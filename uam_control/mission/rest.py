@@ -3,8 +3,6 @@
 A motion is (5, 6 + n): chi with its rates, accelerations, jerk and snap.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Values that a scenario switches, looked up at every tick, and an operator's word on one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar

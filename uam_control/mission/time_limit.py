@@ -1,7 +1,5 @@
 """Time limits of a flight, for both engines."""
 
-from __future__ import annotations
-
 from uam_control.mission import MissionParameters, Scenario
 
 STILL_ARMED = 15.0  # s of simulation time for the autopilot's landing after the mission's end

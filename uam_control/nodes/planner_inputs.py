@@ -14,8 +14,6 @@ entry in /diagnostics, and `answers` (how many goals and trajectories were answe
 (the newest) in the mission status.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

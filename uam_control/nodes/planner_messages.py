@@ -1,7 +1,5 @@
 """Goals and trajectories of planners: ROS messages → GoalPose and Points."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Sequence

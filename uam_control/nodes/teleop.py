@@ -1,7 +1,5 @@
 """Node: teleop. joy → twist of the hand, gripper command, hold; see stages/gamepad.py."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

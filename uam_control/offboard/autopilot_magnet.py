@@ -6,8 +6,6 @@ deliverer: in progress at once, accepted after PD_GRIPPER_TO; a request meanwhil
 PD_GRIPPER_TYPE -1 every one fails.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the offboard sequence and the autopilot say to each other: requests, report, reasons."""
 
-from __future__ import annotations
-
 import math
 from enum import Enum
 from typing import NamedTuple

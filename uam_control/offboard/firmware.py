@@ -5,8 +5,6 @@ has of `advice.yaml`, `passing.yaml` and `events.yaml` (texts), `vehicle.yaml` (
 parameters). A new one is such a folder and an entry in `FIRMWARES`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

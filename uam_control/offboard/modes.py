@@ -1,7 +1,5 @@
 """Flight modes, command results, severities and command ids."""
 
-from __future__ import annotations
-
 from enum import Enum, IntEnum, auto
 
 from uam_control.settings.plain_members import plain_members

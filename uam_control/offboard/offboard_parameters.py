@@ -1,7 +1,5 @@
 """Parameters of the offboard sequence, which are those of the bridge."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.offboard.firmware import PX4, firmware

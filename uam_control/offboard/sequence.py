@@ -28,8 +28,6 @@ nothing is sent until the autopilot's reports are new again: `begin`.
 `return_after_lost_link` is the only exception to the rule of RELEASED: see `_may_return`.
 """
 
-from __future__ import annotations
-
 import math
 from enum import Enum
 

@@ -9,8 +9,6 @@ A profile is read and checked as a whole; the nodes and the direct engine use th
 output of `ros2 param dump` for the nodes of a flight is a profile, too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, make_dataclass, replace

@@ -1,7 +1,5 @@
 """Whether a profile fits its vehicle: numbers that are probably of another one."""
 
-from __future__ import annotations
-
 from uam_control.profiles.profile import Profile
 
 TOLERATED = 0.3  # relative error of an inertia that the adaptive laws take (docs/your_vehicle.md)

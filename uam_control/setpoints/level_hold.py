@@ -3,8 +3,6 @@
 Then the stream of setpoints stops, and the autopilot's own failsafe (COM_OF_LOSS_T) acts.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

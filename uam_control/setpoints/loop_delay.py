@@ -23,8 +23,6 @@ The delay is the mean of both axes, weighted by their ratio of explained to unex
 is unknown if they contradict each other. A loop that begins to oscillate makes the delay known.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -30,8 +30,6 @@ scaled by the local slope of the composed curve.
 Body vectors are FLU. The map is the same in FRD: the signs cancel.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

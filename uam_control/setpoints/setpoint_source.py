@@ -15,8 +15,6 @@ the ground none: it lands and disarms |
 autopilot's failsafe acts |
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

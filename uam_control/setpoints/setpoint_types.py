@@ -8,8 +8,6 @@ controlled by the arm law. Without a reference (idle, level hold) attitude and t
 A new type is a function and a line in SETPOINTS.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

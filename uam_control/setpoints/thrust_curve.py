@@ -13,8 +13,6 @@ is proportional to the motor command, for f = 1 to its square.
 All curves are strictly increasing on 0..1, so the inverse exists; inputs outside are clamped.
 """
 
-from __future__ import annotations
-
 import math
 
 from uam_control.maths.compiled import borrowing

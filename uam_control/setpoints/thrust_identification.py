@@ -23,8 +23,6 @@ and finally long, so that the factor is much slower than the position law.
 A held factor is still applied. After a landing it is kept: battery and motors are the same.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Reader of CSV files with a header: every field where it belongs, and one-line errors."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Collection, Iterator

@@ -4,8 +4,6 @@ Anyone may send one. What is read is bounded in length and depth, and has number
 ROS have, too: no program ends while it works with the value.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -10,8 +10,6 @@ of several nodes can be concatenated.
 A vehicle in a namespace has its sections under `mission:` or `/uav1/mission:`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

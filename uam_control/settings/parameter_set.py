@@ -4,8 +4,6 @@
 its value and the allowed range. The ROS nodes declare their parameters from the same fields.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace

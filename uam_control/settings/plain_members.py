@@ -4,8 +4,6 @@ Python 3.11 finds `State.FLYING` by a descriptor written in Python, which takes 
 compares some twenty of them. From Python 3.12 on members are plain attributes anyway.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import TypeVar
 

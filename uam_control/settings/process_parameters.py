@@ -3,8 +3,6 @@
 And whether the times of its ticks are measured.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Texts: files that people give, words about an unknown name, foreign text made visible."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection
 from difflib import get_close_matches

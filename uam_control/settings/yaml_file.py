@@ -1,7 +1,5 @@
 """Reader of YAML files: numbers as in ROS, every key once, and one-line errors."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Hashable
 from pathlib import Path

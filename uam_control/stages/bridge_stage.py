@@ -5,8 +5,6 @@ newest pose, the setpoint, and compares the thrust with the acceleration. `witho
 `tick` where no commands come.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Mapping

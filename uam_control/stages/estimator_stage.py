@@ -1,7 +1,5 @@
 """Stage: motion capture + IMU + joints → state."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 One compiled call per tick: loop delay, thrust factor, lift and throttle.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

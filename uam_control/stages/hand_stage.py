@@ -1,7 +1,5 @@
 """Stage: stabilisation of the hand. state + reference → reference of the arm law."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.arm.chain import Chain, ChainParameters

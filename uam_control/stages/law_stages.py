@@ -1,7 +1,5 @@
 """Stage: an adaptive law, and the ticks at which its gains are published."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """Stage: mission and supervisor. state + autopilot + limits' inputs → reference, magnet, arming."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from typing import NamedTuple

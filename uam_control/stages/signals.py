@@ -1,7 +1,5 @@
 """The signals between the stages of a tick, in one process."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self

@@ -4,8 +4,6 @@ A compiled step does the same on the same memory. Where something is to be decid
 nothing and says so; then the function in Python does the stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ kind and reads it at the next reading. Ages are differences of stamps, so the de
 has no effect.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

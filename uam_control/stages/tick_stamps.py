@@ -15,8 +15,6 @@ has another stamp if an IMU sample is missing or the IMU's clock drifts. This re
 too, carried on by its own rates; the error is of third order in the difference.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, prepared

@@ -1,7 +1,5 @@
 """The control period."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, number

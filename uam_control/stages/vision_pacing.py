@@ -1,7 +1,5 @@
 """Selection and rate of the mocap poses sent to the autopilot's estimator."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 The monitors run only if a value is near or beyond a limit, or was so recently.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -6,8 +6,6 @@ decides (after_restart for a lost controller). A quantity whose limit has been c
 lands after wait_timeout, or after command_timeout if a command or a reached goal started it.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The supervisor's readings besides state and reference, collected message by message."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

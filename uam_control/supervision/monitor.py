@@ -1,7 +1,5 @@
 """Monitor of one quantity against its limits, with hysteresis in time and value."""
 
-from __future__ import annotations
-
 import math
 from enum import IntEnum
 

@@ -1,7 +1,5 @@
 """Inputs of the supervisor at a tick: observation, readings, operator commands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from enum import Enum

@@ -4,8 +4,6 @@ An autopilot with its own clock (hardware in the loop) cannot fly a vehicle whos
 slowly: its rate loop and its estimator integrate over the wrong time.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

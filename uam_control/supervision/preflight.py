@@ -1,7 +1,5 @@
 """The pre-arm report: every quantity with its limit, before the vehicle may be armed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -9,8 +9,6 @@ The loop delay is unknown while the vehicle hardly moves, and while something el
 that begins to oscillate moves.
 """
 
-from __future__ import annotations
-
 import math
 
 from uam_control.maths.compiled import borrowing

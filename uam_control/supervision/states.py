@@ -4,8 +4,6 @@ There are no other transitions than those of `TRANSITIONS`. docs/supervision.md 
 diagram; a test compares the two.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import NamedTuple
 

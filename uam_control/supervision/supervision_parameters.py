@@ -1,7 +1,5 @@
 """Limits and reactions of the supervisor, parameters of the mission node."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise

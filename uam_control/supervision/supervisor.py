@@ -8,8 +8,6 @@ the autopilot still follows it. When somebody else takes control it releases the
 lands without a bridge that flies on.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Parameters of the nodes that follow from a vehicle's numbers."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

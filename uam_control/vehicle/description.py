@@ -3,8 +3,6 @@
 Frames: FLU body frame (x forward, y left, z up). PX4's parameters are FRD (y right).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

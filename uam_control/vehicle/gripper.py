@@ -4,8 +4,6 @@
 hung on the vehicle's own: see `model_spec`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Reader of vehicle descriptions; an invalid description gives a one-line error."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Check of the numbers of a vehicle's description that the simulated plant reads."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.settings.section import Section

@@ -6,8 +6,6 @@ roll and pitch by the same factor to the norm sqrt(n/2) for n rotors; yaw to a l
 thrust to a mean entry of 1.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

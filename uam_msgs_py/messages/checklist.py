@@ -3,8 +3,6 @@
 A checklist has its state, then one status per item, a report one status per check.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol

@@ -6,8 +6,6 @@ Only this module converts quaternions between [w x y z] (maths) and x, y, z, w (
 Stamps are integer nanoseconds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

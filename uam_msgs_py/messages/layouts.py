@@ -9,8 +9,6 @@ counted from the end of the four bytes of encapsulation; a sequence is its lengt
 by its elements.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field

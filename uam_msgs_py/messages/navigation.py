@@ -1,7 +1,5 @@
 """The estimate and the plan in nav_msgs, for standard tools."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

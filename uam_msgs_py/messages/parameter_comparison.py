@@ -5,8 +5,6 @@ The bridge adds this status to /uam/autopilot/state where parameters are require
 JSON {"found": number or null, "required": text, "why": text}.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Self

@@ -5,8 +5,6 @@ are then published. A received message consists of its bytes and their layout. S
 nanoseconds.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

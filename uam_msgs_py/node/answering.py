@@ -3,8 +3,6 @@
 rclpy's own callbacks raise too: ValueError for a parameter of an unknown type.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Coroutine
 
 from rclpy.executors import SingleThreadedExecutor

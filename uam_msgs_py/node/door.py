@@ -10,8 +10,6 @@ Other joint names or their order, wrong lengths, numbers that are not finite, st
 clock: the next good message is used.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import traceback

@@ -5,8 +5,6 @@ dead sensor look fresh. The clock of a node's ticks is the input that starts the
 in the estimator, those of the state in the other nodes.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Mapping
 

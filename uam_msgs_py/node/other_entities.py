@@ -8,8 +8,6 @@ turns: five times a second each. Clients and events are passed to a SingleThread
 requests are not: that executor would serve waiting messages first.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Polling of topics: the program takes messages by its `Door` when it needs them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup

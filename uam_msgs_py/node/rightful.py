@@ -12,8 +12,6 @@ The parameter `publishers` of every reader names others:
     publishers: "any"                                         the same for every topic
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rclpy.node import Node

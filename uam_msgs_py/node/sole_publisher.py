@@ -14,8 +14,6 @@ This module calls the same function of librcl. The structures are those of rmw/t
 rcutils/types/uint8_array.h of ROS 2 Jazzy.
 """
 
-from __future__ import annotations
-
 import ctypes
 import time
 from collections import defaultdict, deque

@@ -7,8 +7,6 @@ and snap are continuous between the parts and at rest, and the snap is zero at t
 is the angular acceleration of the body, so the torque has no step.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

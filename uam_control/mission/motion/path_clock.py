@@ -1,7 +1,5 @@
 """The clock of a path: it runs, slows down to a stop, restarts, or runs backwards."""
 
-from __future__ import annotations
-
 import math
 from typing import TypeVar
 

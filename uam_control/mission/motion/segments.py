@@ -1,7 +1,5 @@
 """Motions from one state to rest: to a goal, or from beside the path back to it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DOT, JERK, SNAP

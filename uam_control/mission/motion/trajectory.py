@@ -1,7 +1,5 @@
 """Smooth, bounded motions: chi_d and derivatives up to the snap as functions of mission time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 

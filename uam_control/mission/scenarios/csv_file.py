@@ -14,8 +14,6 @@ t and the position are required. Agilicious' names p_x, q_w, v_x, a_lin_x ... me
 body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

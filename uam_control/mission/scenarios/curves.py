@@ -5,8 +5,6 @@ The composition is sampled with value, rate, acceleration, jerk and snap, and in
 polynomials of degree 9 through them; the error is below 1e-9 m.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

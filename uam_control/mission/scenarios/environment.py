@@ -4,8 +4,6 @@ Kinds: config/environment.yaml. The plant makes bodies of the entries; a real ve
 real ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cache

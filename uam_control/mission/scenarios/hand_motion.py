@@ -7,8 +7,6 @@ begins before the task does. Solved along the whole trajectory by Newton's metho
 its iterates have all derivatives that a motion needs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

@@ -5,8 +5,6 @@ with derivatives up to the sixth continuous at the inner points (Mellinger and K
 are as many linear equations as unknowns.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

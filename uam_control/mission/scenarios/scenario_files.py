@@ -1,7 +1,5 @@
 """Scenario files: YAML (config/scenarios), or CSV trajectories."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

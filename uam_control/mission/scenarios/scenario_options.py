@@ -1,7 +1,5 @@
 """Options of a scenario, fixed for a flight."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, choice, number, switch
