@@ -20,7 +20,7 @@ from collections.abc import Callable
 from rich.table import Table
 
 from uam_control.vehicle import VehicleDescription
-from uam_lab.cli.command import Command, Subcommands
+from uam_lab.cli.command import Command
 from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.devices.dynamixel import control_table as names
@@ -35,9 +35,7 @@ from uam_sim_bridge.devices.servo_bus import tried
 AS_DESCRIBED, OTHERWISE = 0, 1
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.arm_hardware()
     command.switch("--write-settings", "write operating mode, return delay and current limit")
     command.switch("--scan", "list ids and models at every baud rate, whatever is described")
@@ -45,7 +43,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     if options.scan:
         return scan(described(options)[1], options.answer_timeout)
     driver = driver_of(options, write_settings=options.write_settings)

@@ -22,7 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from uam_control.mission import load_scenario
-from uam_lab.cli.command import Command, Subcommands, chosen_process, number
+from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.experiments.budget.path import NoTicks
 from uam_lab.experiments.budget.shuttle import JOINTS, shuttle
 from uam_lab.flights import flight_settings
@@ -40,9 +40,7 @@ MEASURED, NOT_COMPLETED = 0, 1
 SCENARIO = "shuttle.yaml"
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     minutes = number("time", "min", 0.5, 600.0)
     command.option("--minutes", "MIN", "length of the flight", 10.0, type=minutes)
     text = "in place of --minutes: a name of config/scenarios or a file"
@@ -56,7 +54,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly, print and write the budgets; return the exit status."""
     require_ros()
     from uam_lab.experiments.budget import flown, report
 

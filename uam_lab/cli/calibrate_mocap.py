@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.cli.command import Command, Subcommands, number
+from uam_lab.cli.command import Command, number
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import say
@@ -50,9 +50,7 @@ STEPS = {
 DEFAULTS = MocapParameters()
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.config()
     for flag, metavar, name, text, how in (
         ("--server", "HOST", "server", "computer of the system", {}),
@@ -82,7 +80,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure, compute and write the calibration; return the exit status."""
     from uam_sim_bridge.devices.mocap import calibration, measurement
     from uam_sim_bridge.devices.mocap.calibration import fit
 

@@ -31,7 +31,6 @@ from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import (
     Command,
-    Subcommands,
     chosen_effects,
     count,
     given_profile,
@@ -47,9 +46,7 @@ from uam_lab.records.results.terminal import say
 TABLE, USUAL = "flights.parquet", "robustness"
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.option("--flights", "N", "", 1000, type=count)
     command.option("--draws", "I,I,...", "only these flights, counted from 0 (default: all)", "")
     command.switch("--replay", "fly the one flight of --draws as uam fly does: report and video")
@@ -65,7 +62,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly, then write the results; return the exit status."""
     from uam_lab.experiments.campaign.variations import Draws, ranges
 
     place = place_of(options)

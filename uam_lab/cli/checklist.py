@@ -24,7 +24,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.cli.command import Command, guest_of
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.terminal import Terminal, say
 from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem
@@ -40,9 +40,7 @@ MARKS = {PASSED: ("ok", "green"), FAILED: ("FAIL", "bold red"), OPEN: ("open", "
 KEYS = "c or Enter: confirm    r: repeat    q: quit"
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     text = "show: print it once; without: live"
     choices = (LIVE, SHOW, CONFIRM, REPEAT)
     command.option("what", None, text, LIVE, nargs="?", choices=choices)
@@ -50,7 +48,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     with guest_of(options) as guest:
         from uam_lab.flights.operator import NoFlight, Operator
 

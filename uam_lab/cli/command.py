@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from uam_control.laws import catalogue
@@ -34,28 +35,31 @@ WRONG_USE = 2  # exit status
 class Command:
     """The parser of a subcommand; its methods add options, with the default in the help."""
 
-    def __init__(
-        self, commands: Subcommands, page: str, run: Callable[[argparse.Namespace], int]
-    ) -> None:
-        """page: the docstring of the command's module: `uam <name>`: summary, description,
-        examples, with an empty line between. run: of the options, returns the exit status."""
+    def __init__(self, commands: Subcommands, name: str, module: ModuleType) -> None:
+        """module: of this package, with `add`, which adds its options to a command, and `run`:
+        options → exit status. Its docstring, or `page(name)`: `uam <name>`: summary, description,
+        examples, with an empty line between."""
+        page = module.page(name) if hasattr(module, "page") else module.__doc__
         head, description, examples = page.split("\n\n", 2)
-        title, _, summary = head.removesuffix(".").partition("`: ")
-        self._name = title.split()[-1]
+        summary = head.removesuffix(".").partition("`: ")[2]
+        self.name = name
         parser = commands.add_parser(
-            self._name,
+            name,
             help=summary,
             description=description,
             epilog=examples,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        parser.set_defaults(run=run)
+        parser.set_defaults(run=module.run)
         self._add, self._parser = parser.add_argument, parser
+        module.add(self)
 
-    def subcommands(self) -> Subcommands:
-        """Return the place of commands below this one, which runs without them, too."""
+    def subcommands(self, **modules: ModuleType) -> None:
+        """Add commands below this one, which runs without them, too."""
         text = "in place of this one; each has --help"
-        return self._parser.add_subparsers(metavar="<command>", title="further", help=text)
+        below = self._parser.add_subparsers(metavar="<command>", title="further", help=text)
+        for name, module in modules.items():
+            Command(below, name, module)
 
     def option(
         self, flag: str, metavar: str | tuple[str, ...], text: str, default: Any = None, **how: Any
@@ -74,9 +78,11 @@ class Command:
         text = f"{text}; may be repeated"
         self._add(flag, metavar=metavar, help=text, action="append", default=[], **how)
 
-    def switch(self, flag: str, text: str, action: str = "store_true", **how: Any) -> None:
-        """Add an option without a value."""
-        self._add(flag, help=text, action=action, **how)
+    def switch(self, flag: str, text: str) -> None:
+        """Add an option without a value; --no-video is `video`, which is true without it."""
+        on = flag.removeprefix("--no-")
+        how = {"action": "store_true"} if on == flag else {"action": "store_false", "dest": on}
+        self._add(flag, help=text, **how)
 
     def choice(self, flag: str, choices: tuple[str, ...], default: str, text: str) -> None:
         """Add an option whose value is one of `choices`."""
@@ -91,7 +97,8 @@ class Command:
         default = kind()
         for name in names.split():
             spec = kind.specs()[name]
-            usual, flag = getattr(default, name), f"--{name.replace('_', '-')}"
+            usual = getattr(default, name)
+            flag = f"--{name.removesuffix('_deg').replace('_', '-')}"
             if isinstance(spec, Switch):
                 self.switch(flag, spec.description)
             elif isinstance(spec, Text) and spec.several:
@@ -101,7 +108,7 @@ class Command:
                 what = number(name.replace("_", " "), spec.unit, spec.low, spec.high)
                 metavar = metavars.get(name, spec.unit.upper().replace("^", "") or "N")
                 kind_of = int if spec.whole else what
-                self.option(flag, metavar, spec.description, usual, type=kind_of)
+                self.option(flag, metavar, spec.description, usual, type=kind_of, dest=name)
             else:
                 words = "|".join(spec.choices) if isinstance(spec, Choice) else spec.allowed
                 self.option(flag, metavars.get(name, words), spec.description, usual)
@@ -184,7 +191,7 @@ class Command:
 
     def out(self, folder: str = "") -> None:
         """Add --out; folder: name of the default folder without the time."""
-        text = f"result folder (default results/<time>-{folder or self._name})"
+        text = f"result folder (default results/<time>-{folder or self.name})"
         self.option("--out", "DIR", text, type=Path)
 
     def instance(self) -> None:

@@ -25,7 +25,7 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, number, place_of
+from uam_lab.cli.command import Command, chosen_effects, count, number, place_of
 from uam_lab.experiments.compare import plan
 from uam_lab.experiments.trials.trial import TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
@@ -35,9 +35,7 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.vehicle()
     command.scenario()
     command.option("--seeds", "N", "seeds 1..N", 5, type=count)
@@ -66,7 +64,6 @@ def _about(result: TrialResult) -> str:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly, then write the results; return the exit status."""
     from uam_lab.experiments.compare import comparison_report, modularity
     from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment

@@ -16,7 +16,7 @@ import argparse
 
 from rich.text import Text
 
-from uam_lab.cli.command import Command, Subcommands
+from uam_lab.cli.command import Command
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_lab.preflight.doctor.finding import Finding, Verdict
@@ -28,9 +28,7 @@ FINE, BROKEN = 0, 1
 STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.config()
     text = f"check an autopilot there: {ALLOWED} (default: the lab file's)"
     command.option("--autopilot", "URL", text, "")
@@ -38,7 +36,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     lab = None if options.config is None else load_lab(options.config)
     url = options.autopilot or (lab.autopilot if lab else "")
     if url:

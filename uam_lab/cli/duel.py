@@ -14,16 +14,14 @@ Results in --out: tables.md, flights.parquet. Deviations from the published task
 
 import argparse
 
-from uam_lab.cli.command import Command, Subcommands, count, place_of
+from uam_lab.cli.command import Command, count, place_of
 from uam_lab.flights.conclude import command_line
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     text = "a duel of config/duel, or a file"
     command.option("name", "NAME|FILE", text, "fsc_lab", nargs="?")
     command.option("--seeds", "N", "seeds 1..N (default: the duel's)", type=count)
@@ -33,7 +31,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly, then write the tables; return the exit status."""
     from uam_lab.experiments.duel import flights
     from uam_lab.experiments.duel.flights import ROWS, load_duel, measure, trials
     from uam_lab.experiments.trials.carried import inputs

@@ -33,7 +33,6 @@ from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import (
     Command,
-    Subcommands,
     chosen_effects,
     count,
     given_profile,
@@ -58,9 +57,7 @@ if TYPE_CHECKING:
 BROKEN = 1
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.switch("--list", "list the faults; do not fly")
     text = "faults and moments, as config/campaign/faults.yaml"
     command.option("--matrix", "NAME|FILE", text, "faults")
@@ -84,7 +81,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List, or check, fly and write the results; return the exit status."""
     if options.list:
         say(fault_catalogue.listing())
         return 0

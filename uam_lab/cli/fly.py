@@ -41,7 +41,7 @@ from dataclasses import replace
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command, Subcommands, chosen_process, number
+from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.flights import flight_settings
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import FlightOptions
@@ -57,9 +57,7 @@ from uam_sim_bridge.faults.schedule import late
 COMPLETED, NOT_COMPLETED = 0, 1
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     option = command.option
     text = "; ".join(f"{name}: {law.label}" for name, law in catalogue.LAWS.items())
     option("--controller", "NAME", text, catalogue.DEFAULT)
@@ -98,18 +96,14 @@ def add(commands: Subcommands) -> None:
     command.described(FlightOptions, "without view faults")
     command.out("<scenario>-<controller>")
     command.described(FlightOptions, "log_limit")
-    command.switch(
-        "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
-    )
-    text = "leave out the report with its video; uam report makes it later"
-    command.switch("--no-report", text, "store_false", dest="report")
+    command.switch("--no-video", "leave out the video, which takes longest")
+    command.switch("--no-report", "leave out the report with its video; uam report makes it later")
     command.described(FlightOptions, "instance")
     command.process()
     command.described(FlightOptions, "namespace domain")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     given = {name: value for name, value in vars(options).items() if name not in ("command", "run")}
     given["process"] = chosen_process(given)
     delays = [

@@ -26,7 +26,7 @@ from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import DOWN, hand_pose, vehicle_centre
 from uam_control.maths.rotations import quaternion_from_matrix
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of, load_description
-from uam_lab.cli.command import Command, Subcommands, number, refuse_given
+from uam_lab.cli.command import Command, number, refuse_given
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.records.results.terminal import say
 
@@ -43,9 +43,7 @@ OF = {
 }
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     choices = tuple(ACTIONS)
     command.option("action", None, f"one of {', '.join(choices)}", choices=choices)
     command.vehicle()
@@ -73,7 +71,6 @@ def angles(text: str) -> list[float]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the answer; return the exit status."""
     for name, (action, needed) in OF.items():
         given = getattr(options, name)
         if action != options.action:

@@ -24,31 +24,22 @@ from uam_control.arm.chain import carrying
 from uam_control.arm.kinematics import gravity_torque
 from uam_control.vehicle import chain_of
 from uam_lab.cli.arm import described, driver_of
-from uam_lab.cli.command import Command, Subcommands, number
+from uam_lab.cli.command import Command, number
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.excitation import ExcitationParameters
 from uam_sim_bridge.devices.dynamixel.friction_fit import FrictionFit
 
 DONE, NOT_DONE = 0, 1
+MOTION = "amplitude_deg duration effort_max"  # options
 GRID = 181  # angles at which the weight is computed
 CLOCK = time.monotonic  # [s]
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.option("joint", "JOINT", "name of the joint, as alpha_2")
     command.arm_hardware()
-    specs, default = ExcitationParameters.specs(), ExcitationParameters()
-    for flag, metavar, name in (
-        ("--amplitude", "DEG", "amplitude_deg"),
-        ("--duration", "S", "duration"),
-        ("--effort-max", "NM", "effort_max"),
-    ):
-        spec = specs[name]
-        kind = number(name, spec.unit, spec.low, spec.high)
-        command.option(flag, metavar, spec.description, getattr(default, name), type=kind)
+    command.described(ExcitationParameters, MOTION, effort_max="NM")
     angle = number("angle", "deg", -360.0, 360.0)
     text = "centre of the motion (default: nearest to the present angle)"
     command.option("--centre", "DEG", text, type=angle)
@@ -59,7 +50,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the experiment; return the exit status."""
     from uam_lab.records.results.result_folder import make_folder
     from uam_lab.report.figures.joint_friction import draw
     from uam_sim_bridge.devices.dynamixel.excitation import Aborted, centre_of, excite
@@ -72,13 +62,7 @@ def run(options: argparse.Namespace) -> int:
     if driver.in_position_mode:
         raise ArmError("the vehicle's servos.mode is position; identification needs current")
     joint = names.index(options.joint)
-    p = ExcitationParameters.from_mapping(
-        {
-            "amplitude_deg": options.amplitude,
-            "duration": options.duration,
-            "effort_max": options.effort_max,
-        }
-    )
+    p = ExcitationParameters.from_mapping({name: vars(options)[name] for name in MOTION.split()})
     try:
         driver.start()
         for remark in driver.remarks:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from uam_control.mission import load_scenario
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, Subcommands, given_profile, number
+from uam_lab.cli.command import Command, given_profile, number
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -31,9 +31,7 @@ STABLE, UNSTABLE = 0, 1
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.profile()
     command.vehicle()
     command.scenario()
@@ -50,7 +48,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute, print and write the margins; return the exit status."""
     from uam_lab.experiments.margins import gains, report
     from uam_lab.experiments.margins.cases import cases_of, smallest_delay
     from uam_lab.experiments.margins.pose_delay import pose_delay

@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from uam_control.settings.texts import visible
-from uam_lab.cli.command import Command, Subcommands, guest_of, number
+from uam_lab.cli.command import Command, guest_of, number
 from uam_lab.records.results.terminal import say
 
 if TYPE_CHECKING:
@@ -60,24 +60,26 @@ Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong
 """
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommands to the command line."""
-    made = {}
-    for name, texts in WHAT.items():
-        examples = (PLACES, "goto 0.5 0 1.2") if name == "goto" else ("", name)
-        made[name] = Command(commands, PAGE.format(name, *texts, *examples), _run)
-        made[name].instance()
-    made["kill"].switch("--yes", "do not ask")
-    goto = made["goto"]
+def page(name: str) -> str:
+    """Return the help of a command."""
+    examples = (PLACES, "goto 0.5 0 1.2") if name == "goto" else ("", name)
+    return PAGE.format(name, *WHAT[name], *examples)
+
+
+def add(command: Command) -> None:
+    command.instance()
+    if command.name == "kill":
+        command.switch("--yes", "do not ask")
+    if command.name != "goto":
+        return
     for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is, of the base")):
-        goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
+        command.option(axis, axis.upper(), text, type=number("coordinate", "m"))
     text = "heading (default: as it is)"
-    goto.option("--yaw", "DEGREES", text, type=number("heading", "degrees"))
-    goto.switch("--hand", "position and heading of the end effector")
+    command.option("--yaw", "DEGREES", text, type=number("heading", "degrees"))
+    command.switch("--hand", "position and heading of the end effector")
 
 
-def _run(options: argparse.Namespace) -> int:
-    """Run a command on the flight; return the exit status."""
+def run(options: argparse.Namespace) -> int:
     with guest_of(options) as guest:
         from uam_lab.flights.operator import Operator
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from uam_control.settings.texts import visible
 from uam_lab.cli import output
-from uam_lab.cli.command import WRONG_USE
+from uam_lab.cli.command import WRONG_USE, Command
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.terminal import say
 
@@ -18,8 +18,8 @@ OURS = "uam_"  # packages whose errors have a text of one line for the user
 LONGEST_ERROR = 2000  # [characters]
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
-# Subcommands and their modules; each module has add(subparsers), which sets `run`: arguments → exit
-# status. Only the module of the chosen command is imported: all of them take seconds.
+# Subcommands and their modules, see `Command`. Only the module of the chosen command is imported:
+# all of them take seconds.
 OPERATE = ("start", "hold", "resume", "land", "disarm", "kill", "goto", "status", "preflight")
 COMMANDS = {
     "fly": "fly",
@@ -77,9 +77,8 @@ def parser(command: str = "") -> argparse.ArgumentParser:
     text = "print version and commit"
     top.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help=text)
     commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
-    modules = [COMMANDS[command]] if command in COMMANDS else dict.fromkeys(COMMANDS.values())
-    for module in modules:
-        importlib.import_module(f"uam_lab.cli.{module}").add(commands)
+    for name in (command,) if command in COMMANDS else COMMANDS:
+        Command(commands, name, importlib.import_module(f"uam_lab.cli.{COMMANDS[name]}"))
     return top
 
 

@@ -17,22 +17,19 @@ from typing import Any
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.cli.command import Command, guest_of
 from uam_lab.records.results.terminal import say
 
 CHANGED, REFUSED = 0, 1
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     text = f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file"
     command.option("profile", "NAME|FILE", text, nargs="+")
     command.instance()
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     given = [str(configuration.named("profiles", one)) for one in options.profile]
     with guest_of(options) as guest:
         from uam_lab.flights.ros.profile_switch import (

@@ -21,7 +21,7 @@ import os
 from dataclasses import replace
 
 from uam_control.offboard.autopilot_magnet import GRIPPER
-from uam_lab.cli.command import Command, Subcommands, chosen_effects, number
+from uam_lab.cli.command import Command, chosen_effects, number
 from uam_lab.cli.fly import tell
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import require_ros
@@ -36,9 +36,7 @@ from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.config(TEMPLATE)
     command.option("--scenario", "NAME|FILE", "in place of the lab file's")
     command.repeated(
@@ -65,11 +63,8 @@ def add(commands: Subcommands) -> None:
     command.option("--payload-mass", "KG", "default: the scenario's", type=mass)
     command.seed("of all noise")
     command.out("<scenario>-rehearsal")
-    command.switch(
-        "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
-    )
-    text = "leave out the report with its video; uam report makes it later"
-    command.switch("--no-report", text, "store_false", dest="report")
+    command.switch("--no-video", "leave out the video, which takes longest")
+    command.switch("--no-report", "leave out the report with its video; uam report makes it later")
 
 
 def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
@@ -84,7 +79,6 @@ def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Rehearse and report; return the exit status."""
     require_ros()
     from uam_lab.flights.rehearsal import device_figures
     from uam_lab.flights.rehearsal.engine import fly

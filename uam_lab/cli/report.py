@@ -14,7 +14,7 @@ examples:
 import argparse
 from pathlib import Path
 
-from uam_lab.cli.command import Command, Subcommands
+from uam_lab.cli.command import Command
 from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
 from uam_lab.records.results.terminal import Terminal, say
@@ -24,9 +24,7 @@ WRITTEN = 0
 SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.option("directories", "DIR", "result folder of a flight", nargs="+", type=Path)
     text = "result folder (default: the given one; for several flights results/<time>-report)"
     command.option("--out", "DIR", text, type=Path)
@@ -38,7 +36,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
     return several(options) if len(options.directories) > 1 else one(options)
 
 
@@ -60,10 +57,9 @@ def one(options: argparse.Namespace) -> int:
     else:
         raise ResultFolderError(f"{directory} has no {LOG} for a report")
     console = Terminal()
-    pictures = not options.no_pictures
     with reporting(console) as show:
         report = build_report(
-            out, show, video=not options.no_video, pictures=pictures, ulog=options.ulog
+            out, show, video=options.video, pictures=options.pictures, ulog=options.ulog
         )
     console.print(summary(metrics, out))
     info = out / "info.json"

@@ -15,23 +15,20 @@ import time
 
 from uam_control.stages.gamepad import DEFAULT, Keys, Mapping
 from uam_lab.cli import keys
-from uam_lab.cli.command import Command, Subcommands, guest_of
+from uam_lab.cli.command import Command, guest_of
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.terminal import say
 
 END = "x"
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.instance()
     text = "name of a file in config/teleop, or a file"
     command.option("--mapping", "NAME|FILE", text, DEFAULT)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Send keys until the end; return the exit status."""
     mapping = Mapping.read(options.mapping)
     with keys.Keys() as pressed:
         if not pressed.available:

@@ -26,7 +26,7 @@ import sys
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, Subcommands, chosen_effects, count, given_profile, place_of
+from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
 from uam_lab.experiments.trials.counting import Counting
 from uam_lab.experiments.tuning.front import LEAST, SMALL, convergence
 from uam_lab.experiments.tuning.space import TuningError, load_space
@@ -37,9 +37,7 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     text = f"space of config/tuning: {', '.join(configuration.names('tuning'))}"
     command.option("--controller", "NAME", text, catalogue.DEFAULT)
     command.option("--space", "FILE", "file with another space")
@@ -68,7 +66,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Search, show the progress, write the results; return the exit status."""
     from uam_lab.experiments.tuning import search_results
     from uam_lab.experiments.tuning.search import (
         DONE,

@@ -18,16 +18,14 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, load_description
-from uam_lab.cli.command import Command, Subcommands
+from uam_lab.cli.command import Command
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 DONE = 0
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to those of `uam vehicle`."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
     command.option("name", "NAME|FILE", f"{vehicles}, or the description of a vehicle")
     text = "entries in place of those of config/design/criteria.yaml"
@@ -37,7 +35,6 @@ def add(commands: Subcommands) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Design, write and print; return the exit status."""
     from uam_lab.experiments.design import files, search
     from uam_lab.experiments.design.criteria import load_criteria
 

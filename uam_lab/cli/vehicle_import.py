@@ -25,20 +25,23 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
-from uam_lab.cli.command import Command, Subcommands
+from uam_lab.cli.command import Command
 from uam_lab.records.results.terminal import say
 
 DONE = 0
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to those of `uam vehicle`."""
+def page(_: str) -> str:
+    """Return the docstring of this module with the keys of the answers, and the servos."""
     from uam_lab.importing.answers import Answers
     from uam_lab.importing.numbers import servo_types
 
     questions = Answers().assumed.mapping("questions")
     keys = "\n".join(f"  {key:22} {what} [{unit}]" for key, (what, unit) in questions.items())
-    command = Command(commands, __doc__ % (DEFAULT_VEHICLE, keys, ", ".join(servo_types())), run)
+    return __doc__ % (DEFAULT_VEHICLE, keys, ", ".join(servo_types()))
+
+
+def add(command: Command) -> None:
     command.argument("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
     command.option("--out", "DIR", "folder of the files (default ./NAME)", type=Path)
     command.option("--name", "NAME", "of the vehicle (default: that of the file)", "")
@@ -51,13 +54,12 @@ def add(commands: Subcommands) -> None:
     text = "vehicle whose arm hangs below a base without an arm"
     command.option("--arm-of", "NAME|FILE", text, "")
     text = "hang no magnet of 0.07 kg at the end effector: nothing is picked"
-    command.switch("--no-magnet", text, "store_false", dest="magnet")
+    command.switch("--no-magnet", text)
     command.switch("--no-questions", "assume what is not answered; the usual without a terminal")
     command.switch("--overwrite", "write into a folder that has such a vehicle")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Import, write and print; return the exit status."""
     from uam_lab.importing import importer, picture
     from uam_lab.importing.answers import Answers, read_answers
     from uam_lab.importing.source import ImportRefused
@@ -68,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     written = folder / f"{name}.yaml"
     if written.exists() and not options.overwrite:
         raise ImportRefused(f"{written} exists; --overwrite, or another --out or --name")
-    asked = sys.stdin.isatty() and not options.no_questions
+    asked = sys.stdin.isatty() and options.questions
     answers = Answers(read_answers(options.answers, options.answer), _ask if asked else None)
     arm_of = load_description(options.arm_of) if options.arm_of else None
     chosen = Chosen(options.base, options.arm, options.end_effector, options.magnet)

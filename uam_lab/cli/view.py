@@ -18,13 +18,11 @@ import json
 import os
 import sys
 
-from uam_lab.cli.command import Command, Subcommands, chosen_flight
+from uam_lab.cli.command import Command, chosen_flight
 from uam_lab.flights.flight_settings import require_ros
 
 
-def add(commands: Subcommands) -> None:
-    """Add the subcommand to the command line."""
-    command = Command(commands, __doc__, run)
+def add(command: Command) -> None:
     command.instance()
     command.option(
         "--host", "ADDRESS", "address to listen on; the default is this computer only", "127.0.0.1"
@@ -41,7 +39,6 @@ def _port(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until Ctrl-C; return the exit status."""
     require_ros()
     domain, namespace = chosen_flight(options)
     from uam_lab.cockpit import cockpit_node
