@@ -20,7 +20,7 @@ from uam_lab.experiments.trials.carried import inputs
 from uam_lab.experiments.trials.outcome import LOST, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
-from uam_lab.records.results.phase_errors import distance, root_mean_square
+from uam_lab.records.results.phase_errors import distance, rms
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant import Vehicle
@@ -155,11 +155,11 @@ def errors_of(series: Series, rows: np.ndarray, attitude: bool) -> tuple[float, 
         return (float("nan"),) * 3
     error = series.block("error.")[rows]
     worst = [
-        float(np.degrees(max(root_mean_square(column) for column in error[:, part].T)))
+        float(np.degrees(max(rms(column) for column in error[:, part].T)))
         for part in (ATTITUDE, ARM)
     ]
     return (
-        root_mean_square(distance(series, rows)),
+        rms(distance(series, rows)),
         worst[0] if attitude else float("nan"),
         worst[1],
     )

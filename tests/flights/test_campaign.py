@@ -17,7 +17,7 @@ from uam_lab.cli.main import main
 from uam_lab.experiments.campaign.variations import Draws, VariationError, common, ranges
 from uam_lab.experiments.trials.outcome import LANDED, classify
 from uam_lab.experiments.trials.trial import figures_of, recorded
-from uam_lab.records.results.metrics import GROUPS
+from uam_lab.records.results.phase_errors import GROUPS
 from uam_sim_bridge.plant.effects import presets
 
 FLIGHTS = 4

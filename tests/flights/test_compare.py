@@ -64,8 +64,8 @@ def test_wrong_use_is_refused_in_one_line(options, message, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_trial_through_the_nodes_is_the_trial_of_the_direct_engine():
-    (proposed,) = plan.entries(["proposed"])
-    requested = trial.Trial(proposed.label, proposed.profile, 0.0, 1, scenario="hover")
+    (proposed,) = plan.entries(["proposed"]).items()
+    requested = trial.Trial(*proposed, 0.0, 1, scenario="hover")
     through_ros, direct = trial.measure(replace(requested, engine="ros")), trial.measure(requested)
     assert through_ros.completed and direct.completed
     assert through_ros.rms == pytest.approx(direct.rms, rel=1e-3)

@@ -47,7 +47,7 @@ def flown(*texts, seed=1, plant="calm", watch=None, scenario=SCENARIO):
     reason = flight.mission.output.abort_reason or flight.ended_by
     info = {
         "abort_reason": reason,
-        "faults": flight.fault_records,
+        "faults": flight.outcome().faults,
         "payload_mass_kg": payload,
         "drop_point": scenario.drop_point,
         "transitions": transitions(flight.mission.changes),

@@ -54,7 +54,7 @@ def test_faults_begin_on_time_and_are_in_the_log(fly, short_scenario, tmp_path):
         scenario, load_profile("s500"), Vehicle.load(), 0.0, 1, read_schedule(IN_BOTH, scenario, 1)
     )
     direct.run()
-    for fault in direct.fault_records:
+    for fault in direct.outcome().faults:
         own = found[fault["fault"]]
         same = 1e-6 if fault["fault"] != "mavlink_corruption" else 0.005  # heard a tick later
         for key in ("begin_s", "end_s"):

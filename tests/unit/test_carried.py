@@ -52,7 +52,7 @@ def test_a_scenario_file_travels_as_it_was_read(tmp_path):
     file = Path(shutil.copy(configuration.root() / "scenarios/hover.yaml", tmp_path / "mine.yaml"))
     profile = load_profile("s500")
     trial = Trial("x", profile, 0.0, 1, str(file))
-    expected = trial.load_scenario()
+    expected = trial.flown_scenario
     trial = replace(trial, carried=carried(trial.scenario, profile))
     file.unlink()
-    assert trial.load_scenario().landing == expected.landing
+    assert trial.flown_scenario.landing == expected.landing

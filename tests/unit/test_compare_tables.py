@@ -112,7 +112,7 @@ def test_the_tables_have_our_figures_the_papers_and_the_degradation():
 
 
 def test_a_row_freezes_one_subsystem_or_all():
-    arm, every = entries(("frozen_arm", "frozen"))
+    arm, every = entries(("frozen_arm", "frozen")).values()
     nodes = ("position_controller", "attitude_controller", "arm_controller")
-    assert [arm.profile.sets[node].adapt for node in nodes] == [True, True, False]
-    assert [every.profile.sets[node].adapt for node in nodes] == [False] * 3
+    assert [arm.sets[node].adapt for node in nodes] == [True, True, False]
+    assert [every.sets[node].adapt for node in nodes] == [False] * 3

@@ -16,15 +16,17 @@ from uam_lab.experiments.faults import rehearsed
 from uam_lab.experiments.faults.matrix import Cell, Promise
 from uam_lab.experiments.faults.rehearsed import judged, with_checklist
 from uam_lab.experiments.trials.outcome import LOST, REFUSED
+from uam_lab.flights.operator import DECODE
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
-from uam_lab.flights.rehearsal.starter import list_passed, list_text, passed_items
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
 from uam_lab.records.recording.logged_topics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
+from uam_msgs_py.messages.status import ChecklistState
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
@@ -225,18 +227,17 @@ def test_latencies_of_given_ticks():
     assert found == pytest.approx([0.013, 0.001]) and missed == 1
 
 
-def checklist(passed, failing, *items):
-    head = report("checklist", passed=passed, failing=failing, step="lift").status[0]
-    head.message = "open: lift"
-    others = [DiagnosticStatus(name=name, level=level) for name, level in items]
-    return DiagnosticArray(status=[head, *others])
-
-
 def test_the_starter_reads_the_lists():
-    message = checklist("False", "battery", ("poses", b"\x00"), ("battery", b"\x02"))
-    assert not list_passed(message) and list_text(message) == "open: lift: battery"
-    assert passed_items(message) == 1
-    assert list_passed(checklist("True", ""))
+    items = [
+        ChecklistItem("poses", "automatic", "passed", "100 Hz", "at least 100 Hz"),
+        ChecklistItem("battery", "automatic", "failed", "50 %", "at least 60 %"),
+    ]
+    message = checklist_message(1, ChecklistState(False, "battery; lift"), items)
+    (_, state), found = DECODE[topics.CHECKLIST](message)
+    assert not state.passed and state.summary == "open: battery; lift"
+    assert [one.result for one in found] == ["passed", "failed"]
+    (_, state), _ = DECODE[topics.CHECKLIST](checklist_message(1, ChecklistState(True), []))
+    assert state.passed
 
 
 def cell(name, at, outcome):

@@ -238,14 +238,18 @@ def test_the_same_study_gives_the_same_numbers_and_continues(study, tmp_path, mo
 def test_the_nodes_fly_with_the_autopilot_gains_of_the_study(study, tmp_path):
     """The stand-in reads the vehicle's file, which has other gains."""
     profile = design.profile(study, study.rows[0], study.document["strengths"])
-    settings = FlightSettings(load_scenario("hover"), profile, profile.vehicle, 0.0)
+    settings = FlightSettings(
+        scenario=load_scenario("hover"), profile=profile, vehicle=profile.vehicle, payload_mass=0.0
+    )
     (tmp_path / "logs").mkdir()
     module, arguments = node_arguments.autopilot(settings, ResultFolder(tmp_path), ports_of(0))
     file = arguments[arguments.index("--params") + 1]
     assert module == node_arguments.STAND_IN
     flown = Parameters.of(study.vehicle, file)
     assert {name: flown[name] for name in INTEGRATORS} == INTEGRATORS
-    own = FlightSettings(load_scenario("hover"), profile, study.vehicle, 0.0)
+    own = FlightSettings(
+        scenario=load_scenario("hover"), profile=profile, vehicle=study.vehicle, payload_mass=0.0
+    )
     assert "--params" not in node_arguments.autopilot(own, ResultFolder(tmp_path), ports_of(0))[1]
 
 

@@ -35,8 +35,8 @@ def test_the_servos_take_the_mode_that_the_arms_setpoints_need():
 
 
 def test_it_is_a_row_of_the_comparison():
-    (row,) = plan.entries(["table1_flown"])
-    assert (row.label, row.profile.name) == ("Table I as probably flown", NAME)
+    ((label, profile),) = plan.entries(["table1_flown"]).items()
+    assert (label, profile.name) == ("Table I as probably flown", NAME)
 
 
 def test_a_fault_of_torque_commands_is_refused_with_goal_positions():

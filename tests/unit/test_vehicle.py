@@ -20,7 +20,7 @@ from uam_lab.flights.vehicle import vehicle_engine, vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Magnet
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
-from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
+from uam_lab.flights.vehicle.vehicle_engine import FlightRun, VehicleCourse
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.terminal import Terminal
 from uam_msgs_py.messages import topics
@@ -265,7 +265,8 @@ def test_wrong_use_is_refused_in_one_line(capsys, tmp_path):
 
 def test_the_flight_of_a_vehicle_continues_without_recorder_and_cockpit(tmp_path):
     children = Mock()
-    vehicle_engine.start_nodes(children, LAB, settings_of(LAB), ResultFolder(tmp_path), "")
+    flight = FlightRun(settings_of(LAB), ResultFolder(tmp_path), None, None, None, "")
+    vehicle_engine.start_nodes(children, LAB, flight)
     started = children.start.call_args_list
     optional = {call.args[0] for call in started if call.kwargs["optional"]}
     assert optional == {"recorder", "cockpit"}

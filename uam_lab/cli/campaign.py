@@ -43,7 +43,7 @@ from uam_lab.flights.flight_settings import FlightSettings, SettingsError
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
-TABLE, USUAL = "flights.parquet", "robustness"
+USUAL = "robustness"
 
 
 def add(command: Command) -> None:
@@ -79,14 +79,12 @@ def run(options: argparse.Namespace) -> int:
         return _replay(draws[numbers[0]], numbers[0], options.out)
 
     from uam_lab.experiments.campaign import report
-    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
 
     out = make_folder(options.out, "campaign")
     given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}
     given["profile"] = (profile.sets, profile.bridge())
     rows = result_rows(len(vehicle.joints), draws.names)
-    of = inputs(vehicle, options.scenario, given)
     bad = 0
 
     def describe(result: TrialResult) -> str:
@@ -94,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         bad += not result.completed
         return f"{bad} not completed"
 
-    campaign = Experiment("campaign", out / TABLE, rows, of, place)
+    campaign = Experiment.of("campaign", out, rows, place, vehicle, options.scenario, given)
     results = campaign.fly(numbers, draws.__getitem__, describe)
     say(report.write(out, results, vehicle.name, command_line(), _again(options)))
     say(f"results  {out}\nreport   {out / 'report.html'}")
@@ -113,7 +111,7 @@ def _replay(trial: Trial, number: int, out: Path | None) -> int:
 
     profile = trial.profile
     settings = FlightSettings(
-        scenario=trial.load_scenario(),
+        scenario=trial.flown_scenario,
         profile=profile,
         vehicle=profile.vehicle,
         payload_mass=trial.payload_mass,

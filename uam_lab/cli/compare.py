@@ -21,7 +21,7 @@ import argparse
 from uam_control.laws import catalogue
 from uam_control.mission import load_scenario
 from uam_control.mission.scenarios.environment import HEAVIEST
-from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
@@ -51,12 +51,11 @@ def add(command: Command) -> None:
     command.out()
 
 
-def _further(text: str, vehicle: VehicleDescription) -> plan.ComparedController:
+def _further(text: str, vehicle: VehicleDescription) -> tuple[str, Profile]:
     label, _, file = text.partition("=")
     if not label or not file:
         raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
-    profile = load_profile(str(configuration.named("profiles", file)), vehicle=vehicle)
-    return plan.ComparedController(label, profile)
+    return label, load_profile(str(configuration.named("profiles", file)), vehicle=vehicle)
 
 
 def _about(result: TrialResult) -> str:
@@ -65,7 +64,6 @@ def _about(result: TrialResult) -> str:
 
 def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.compare import comparison_report, modularity
-    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
 
     if options.engine == "ros":
@@ -74,10 +72,8 @@ def run(options: argparse.Namespace) -> int:
     vehicle = load_description(options.vehicle)
     scenario = options.scenario
     load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
-    rows = (
-        *plan.entries(options.rows or tuple(plan.ROWS), vehicle),
-        *(_further(text, vehicle) for text in options.profile),
-    )
+    rows = plan.entries(options.rows or tuple(plan.ROWS), vehicle)
+    rows |= (_further(text, vehicle) for text in options.profile)
     effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)
@@ -88,17 +84,11 @@ def run(options: argparse.Namespace) -> int:
     kept = out / "flights" / "modularity.parquet"
     # direct engine: these flights compare the laws only, which are the same in both engines
     every = [*trials, *modularity.trials(proposed, flights, kept)]
-    profiles = [(row.label, row.profile.sets, row.profile.bridge()) for row in rows]
+    profiles = [(label, one.sets, one.bridge()) for label, one in rows.items()]
     of = {"profiles": profiles, "flights": (payloads, seeds, options.engine, effects)}
-    comparison = Experiment(
-        "compare",
-        out / "flights.parquet",
-        result_rows(len(vehicle.joints)),
-        inputs(vehicle, scenario, of),
-        place,
-    )
-    found = comparison.fly(range(len(every)), every.__getitem__, _about)
-    results = list(found.values())
+    table = result_rows(len(vehicle.joints))
+    comparison = Experiment.of("compare", out, table, place, vehicle, scenario, of)
+    results = comparison.fly_all(every, _about)
     results, others = results[: len(trials)], results[len(trials) :]
     modular = modularity.ModularityEvidence.of(proposed, kept, others)
     facts = {
@@ -109,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
         "payloads_kg": payloads,
         "seeds": seeds,
         "effects": effects,
-        "profiles": {row.label: row.profile.file.name for row in rows},
+        "profiles": {label: one.file.name for label, one in rows.items()},
         "budgets": comparison_report.budgets(rows),
     }
     text, page = comparison_report.write(out, trials, results, modular, facts)

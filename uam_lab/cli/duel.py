@@ -33,7 +33,6 @@ def add(command: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.duel import flights
     from uam_lab.experiments.duel.flights import ROWS, load_duel, measure, trials
-    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
 
     duel = load_duel(options.name, tuple(options.rows or ()))
@@ -42,11 +41,9 @@ def run(options: argparse.Namespace) -> int:
     profiles = [(label, one.sets, one.bridge()) for label, one in duel.rows.items()]
     given = {"profiles": profiles, "plant": duel.plant, "scenarios": duel.scenarios, "seeds": seeds}
     out = make_folder(options.out, "duel")
-    table = out / "flights.parquet"
-    of = inputs(duel.vehicle, duel.scenarios[0], given)
-    experiment = Experiment("duel", table, ROWS, of, place_of(options), measure)
-    found = experiment.fly(range(len(planned)), planned.__getitem__, _about)
-    text = flights.tables(duel, list(found.values()))
+    of = place_of(options), duel.vehicle, duel.scenarios[0], given
+    experiment = Experiment.of("duel", out, ROWS, *of, measure)
+    text = flights.tables(duel, experiment.fly_all(planned, _about))
     write_text(out / "tables.md", f"{text}\nMade by `{command_line()}`.\n")
     say(text)
     say(f"results  {out}")

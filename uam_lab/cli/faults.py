@@ -87,7 +87,6 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.faults import matrix as fault_matrix
     from uam_lab.experiments.faults import report
     from uam_lab.experiments.faults.trial import ROWS
-    from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import Experiment
 
     place = place_of(options)
@@ -118,16 +117,8 @@ def run(options: argparse.Namespace) -> int:
     known = replace(matrix, draws=bool(matrix.draws))  # more draws are a longer table
     settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
     of = settings | {"matrix": known, "profile and effects": further}
-    experiment = Experiment(
-        kind,
-        out / "flights.parquet",
-        ROWS,
-        inputs(vehicle, matrix.scenario, of),
-        place,
-        measure,
-    )
-    found = experiment.fly(range(len(cells)), lambda number: make(cells[number], out), _about)
-    results = list(found.values())
+    experiment = Experiment.of(kind, out, ROWS, place, vehicle, matrix.scenario, of, measure)
+    results = experiment.fly_all([make(cell, out) for cell in cells], _about)
     again = _again(options, matrix)
     summary, page = report.write(out, matrix, results, vehicle.name, command_line(), again)
     say(summary)
@@ -163,7 +154,6 @@ class _Prepared(NamedTuple):
 
 
 def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription) -> _Prepared:
-    """Prepare the flights of the engines of `uam fly`."""
     from uam_lab.experiments.faults.trial import FaultTrial, measure
 
     profile = given_profile(options.profile, vehicle)
@@ -190,7 +180,6 @@ def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescri
 def _rehearsals(
     options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription
 ) -> _Prepared:
-    """Prepare the rehearsals of the lab file."""
     from uam_lab.experiments.faults.rehearsed import RehearsedTrial, measure
 
     lab = load_lab(options.config)

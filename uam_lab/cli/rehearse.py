@@ -29,6 +29,7 @@ from uam_lab.flights.library.flight_result import FlightResult
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.flights.progress import Progress
 from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab, settings_of
+from uam_lab.records.results.result_folder import known_json
 from uam_lab.records.results.terminal import Terminal
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
 from uam_sim_bridge.plant.effects import presets
@@ -109,5 +110,5 @@ def run(options: argparse.Namespace) -> int:
     with Progress(console, landing.end) as progress, Interrupts() as stop:
         folder, outcome, metrics = fly(lab, settings, progress, stop)
     result = FlightResult(folder, metrics, outcome)
-    further = device_figures.lines(device_figures.saved(folder))
+    further = device_figures.lines(known_json(folder / device_figures.NAME))
     return tell(console, settings, result, "rehearse", options.video, options.report, further)

@@ -23,6 +23,7 @@ import getpass
 import shlex
 import sys
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from uam_control.settings import configuration
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if options.systemd:
         say(unit(lab.file, Path.cwd()), end="")
         return DONE
-    from uam_lab.flights.vehicle.vehicle_engine import VehicleEngine  # needs ROS
+    from uam_lab.flights.vehicle import vehicle_engine  # needs ROS
 
     settings = settings_of(lab, command_line(), options.dry_run)
     missed = missed_margins(settings)
@@ -71,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         out = new_folder(lab.out.expanduser(), f"{stamp}-{in_a_name(settings.scenario.name)}")
     settings = dataclasses.replace(settings, out=out, notes=settings.notes + missed)
-    engine = VehicleEngine(lab).fly
+    engine = partial(vehicle_engine.fly, lab)
     return fly(settings, video=False, report=options.report, engine=engine, name="vehicle")
 
 

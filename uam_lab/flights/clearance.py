@@ -57,8 +57,9 @@ def check_standing(
     ):
         room = room_below(model, vehicle.joint_names, angles)
         if room is not None and room < -SINKS:
+            at = ", ".join(f"{angle:.0f}" for angle in np.degrees(angles) + 0.0)
             raise error(
-                f"{where} {what}: with joints at {_degrees(angles)} deg the arm reaches "
+                f"{where} {what}: with joints at {at} deg the arm reaches "
                 f"{-room:.3f} m below the feet; it must stay above them on the ground"
             )
 
@@ -77,10 +78,6 @@ def _check_surroundings(vehicle: VehicleDescription, scenario: Scenario) -> None
         raise ScenarioError(
             f"scenario {scenario.name}: environment: {one} and {other} intersect by {depth:.3f} m"
         )
-
-
-def _degrees(angles: Sequence[float]) -> str:
-    return ", ".join(f"{angle:.0f}" for angle in np.degrees(angles) + 0.0)
 
 
 def notes(vehicle: VehicleDescription, scenario: Scenario, mass: float) -> tuple[str, ...]:

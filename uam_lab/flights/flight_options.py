@@ -1,11 +1,9 @@
 """The options of a flight, each described once: library, command line and lab file have these."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from uam_control.laws import catalogue
 from uam_control.mission import ScenarioOptions
@@ -49,13 +47,64 @@ LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 
 
 def _of_scenario(name: str) -> Any:
-    """Declare a field as of `ScenarioOptions`."""
     default = getattr(ScenarioOptions(), name)
     return field(default=default, metadata={"spec": ScenarioOptions.specs()[name]})
 
 
 @dataclass(frozen=True)
-class FlightOptions(ParameterSet):
+class KeptOptions(ParameterSet):
+    """Options that the settings of a flight have as they are given."""
+
+    controller: str = choice(catalogue.DEFAULT, "law of the controllers", catalogue.LAWS)
+    engine: str = choice("ros", "nodes and sockets, or one loop without them", ENGINES)
+    clock: str = choice(
+        "lockstep", "simulated time, repeatable for the same seed; or the wall clock", CLOCKS
+    )
+    imu: str = choice(
+        IMUS[0], "IMU of the estimator: the companion's, or the autopilot's over MAVLink", IMUS
+    )
+    plant: str = text(
+        DEFAULT_PLANT,
+        f"physics engine: {', '.join(PLANTS)}, or a class of your own",
+        "NAME|MODULE:CLASS",
+    )
+    autopilot: str = text(
+        BUILTIN,
+        "the stand-in; PX4 in software; or the link of an autopilot that you started: "
+        f"{ALLOWED}; serial: a flight controller in HITL mode",
+        "builtin|px4|URL",
+    )
+    px4_params: tuple[str, ...] = texts(
+        "a parameter of PX4 in software, in place of config/'s; with --autopilot px4", "NAME=VALUE"
+    )
+    sim_address: str = text(
+        HOST,
+        "address of this machine at which the simulator waits for an autopilot that you start; "
+        "0.0.0.0: also from other machines, which is not secure",
+        "ADDRESS",
+    )
+    gcs: str = text("", "ground station, as udp:127.0.0.1:14550 (default: none)", "URL")
+    seed: int = integer(1, "of all noise", 0, LAST_SEED)
+    log_limit: float = number(
+        LOG_LIMIT, "size at which log.mcap ends, after hours; the flight continues", "MB", 1.0, 1e9
+    )
+    dry_run: bool = switch(
+        False, "compute all commands for the present pose; send none, arm nothing"
+    )
+    command: str = text("", "for the record of the flight", "COMMAND")
+    domain: int | None = integer(
+        None, f"ROS domain, 0..{LAST_DOMAIN} (default: that of the instance)", 0, LAST_DOMAIN
+    )
+    tick_times: bool = switch(False, "measure the ticks of the nodes that fly")
+    fused: bool = switch(
+        False,
+        "estimator, mission, controllers and bridge as one process, for few cores: "
+        "docs/architecture.md",
+    )
+
+
+@dataclass(frozen=True)
+class FlightOptions(KeptOptions):
     """Options as they are given; None stands for the default.
 
     profile: a later one overrides, see `load_profile`; plant_preset, effects: see
@@ -73,44 +122,14 @@ class FlightOptions(ParameterSet):
     )
     transit_speed: float = _of_scenario("transit_speed")
     transit_acceleration: float = _of_scenario("transit_acceleration")
-    controller: str = choice(catalogue.DEFAULT, "law of the controllers", catalogue.LAWS)
     profile: tuple[str | Path, ...] = texts("parameters of the nodes", "NAME|FILE", file=True)
     vehicle: str | Path = name_or_file(DEFAULT_VEHICLE, "vehicle", "NAME|FILE")
-    engine: str = choice("ros", "nodes and sockets, or one loop without them", ENGINES)
-    clock: str = choice(
-        "lockstep", "simulated time, repeatable for the same seed; or the wall clock", CLOCKS
-    )
-    imu: str = choice(
-        IMUS[0], "IMU of the estimator: the companion's, or the autopilot's over MAVLink", IMUS
-    )
-    plant: str = text(
-        DEFAULT_PLANT,
-        f"physics engine: {', '.join(PLANTS)}, or a class of your own",
-        "NAME|MODULE:CLASS",
-    )
     plant_preset: tuple[str, ...] = texts("effects of the plant", "NAME|FILE")
     effects: tuple[str, ...] = texts("changes of these effects", "SPEC")
-    autopilot: str = text(
-        BUILTIN,
-        "the stand-in; PX4 in software; or the link of an autopilot that you started: "
-        f"{ALLOWED}; serial: a flight controller in HITL mode",
-        "builtin|px4|URL",
-    )
     px4_dir: str | Path | None = name_or_file(
         None, "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)", "DIR"
     )
-    px4_params: tuple[str, ...] = texts(
-        "a parameter of PX4 in software, in place of config/'s; with --autopilot px4", "NAME=VALUE"
-    )
-    sim_address: str = text(
-        HOST,
-        "address of this machine at which the simulator waits for an autopilot that you start; "
-        "0.0.0.0: also from other machines, which is not secure",
-        "ADDRESS",
-    )
-    gcs: str = text("", "ground station, as udp:127.0.0.1:14550 (default: none)", "URL")
     payload_mass: float | None = number(None, "default: the scenario's", "kg", 0.0, HEAVIEST)
-    seed: int = integer(1, "of all noise", 0, LAST_SEED)
     out: str | Path | None = name_or_file(None, "result folder", "DIR")
     vehicle_changes: Mapping[str, Any] = entries("changes of the vehicle's numbers")
     instance: int | None = integer(
@@ -128,9 +147,6 @@ class FlightOptions(ParameterSet):
     view: bool = switch(
         False, "serve the cockpit, a local web page: the scene, charts, gains, commands"
     )
-    log_limit: float = number(
-        LOG_LIMIT, "size at which log.mcap ends, after hours; the flight continues", "MB", 1.0, 1e9
-    )
     faults: tuple[str, ...] = texts(
         "inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
         ":parameter=value,...; or a YAML file with several faults; uam faults --list shows all",
@@ -139,28 +155,15 @@ class FlightOptions(ParameterSet):
     arm: bool = switch(
         False, "arm and take off by itself also with a real autopilot (serial, another host)"
     )
-    dry_run: bool = switch(
-        False, "compute all commands for the present pose; send none, arm nothing"
-    )
     auto_start: bool = switch(True, "begin without a command")
     parameters: Mapping[str, Any] = entries("parameters of single nodes")
     remappings: Mapping[str, Any] = entries("other names of topics and services")
-    command: str = text("", "for the record of the flight", "COMMAND")
     namespace: str = text(
         "",
         "namespace of all nodes, for several vehicles in one ROS domain (default: none)",
         "NAME",
     )
-    domain: int | None = integer(
-        None, f"ROS domain, 0..{LAST_DOMAIN} (default: that of the instance)", 0, LAST_DOMAIN
-    )
     process: Mapping[str, Any] = entries("of the processes of the nodes that fly")
-    tick_times: bool = switch(False, "measure the ticks of the nodes that fly")
-    fused: bool = switch(
-        False,
-        "estimator, mission, controllers and bridge as one process, for few cores: "
-        "docs/architecture.md",
-    )
     inner_rate: float | None = number(
         None,
         "with --fused: messages per second sent of the topics within it (default: all)",
@@ -170,7 +173,7 @@ class FlightOptions(ParameterSet):
     )
 
     @classmethod
-    def of(cls, **given: Any) -> FlightOptions:
+    def of(cls, **given: Any) -> Self:
         """Return checked options. Raises SettingsError, one line."""
         try:
             return cls.from_mapping({k: v for k, v in given.items() if v is not None})

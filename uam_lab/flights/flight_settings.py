@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
-from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import Profile, complete_profile, default_profile, load_profile
 from uam_control.profiles.profile_fit import misfits
@@ -21,12 +20,11 @@ from uam_lab.flights.flight_options import (
     AUTOPILOT_IMU,
     BUILTIN,
     COCKPIT,
-    IMUS,
-    LOG_LIMIT,
     ONLOOKERS,
     PX4,
     REPLACEABLE,
     FlightOptions,
+    KeptOptions,
 )
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.flights.processes import middleware
@@ -39,11 +37,9 @@ from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.imu_faults import of_the_companion
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.hil.hil_server import open_only_here
-from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.px4_installation import Px4Installation
@@ -54,20 +50,17 @@ NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 AUTOPILOT = "autopilot"  # name of its process
 
 
-@dataclass(frozen=True)
-class FlightSettings:
+@dataclass(frozen=True, kw_only=True)
+class FlightSettings(KeptOptions):
     """Checked settings of one flight, with scenario and profile loaded.
 
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
-    {"air.wind": [3.0, 0.0, 0.0]}; imu: the estimator's, of the companion or the autopilot's over
-    MAVLink; out: the result folder, None for the default. autopilot: BUILTIN, PX4, or the URL of an
-    autopilot started by the user; link: that URL, parsed. without: nodes that are not started, see
-    `foreign`; own_names: those of the nodes that the user starts in place of them, where they
-    differ. auto_start: the flight begins without a command; dry_run: nothing is armed. parameters:
-    of the nodes without a profile, node → name → value.
-    remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
-    requested, for its record. namespace: of all nodes, in the form of ROS; domain: ROS domain,
-    None for that of the instance. fused: the control nodes are one process.
+    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. link: to an
+    autopilot started by the user, parsed. without: nodes that are not started, see `foreign`;
+    own_names: those of the nodes that the user starts in place of them, where they differ.
+    auto_start: the flight begins without a command; dry_run: nothing is armed. parameters: of the
+    nodes without a profile, node → name → value. remappings: node, or EVERY_NODE → topic or service
+    → new name. namespace: of all nodes, in the form of ROS; domain: None for that of the instance.
     """
 
     scenario: Scenario
@@ -75,18 +68,8 @@ class FlightSettings:
     vehicle: VehicleDescription
     payload_mass: float
     out: Path | None = None
-    controller: str = catalogue.DEFAULT
-    engine: str = "ros"
-    clock: str = "lockstep"
-    imu: str = IMUS[0]
-    autopilot: str = BUILTIN
     px4: Px4Installation | None = None  # for the autopilot PX4
-    px4_params: tuple[str, ...] = ()  # NAME=VALUE, for the autopilot PX4
-    sim_address: str = HOST  # at which the autopilot connects
     link: LinkUrl | None = None
-    gcs: str = ""  # URL of a ground station
-    seed: int = 1
-    plant: str = DEFAULT_PLANT  # see `plant_class`
     scenario_source: str = ""  # as given by the user: a name or a file
     scenario_options: ScenarioOptions = ScenarioOptions()
     notes: tuple[str, ...] = ()  # about the settings, for the user
@@ -94,18 +77,12 @@ class FlightSettings:
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     without: tuple[str, ...] = (COCKPIT,)
     own_names: dict[str, str] = field(default_factory=dict)
-    log_limit: float = LOG_LIMIT  # [MB] size at which log.mcap ends
     faults: Schedule = Schedule()
     auto_start: bool = True
-    dry_run: bool = False
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
     remappings: dict[str, dict[str, str]] = field(default_factory=dict)
-    command: str = ""
     namespace: str = "/"
-    domain: int | None = None
     process: ProcessParameters = ProcessParameters()  # of the nodes that fly
-    tick_times: bool = False  # whether they measure their ticks
-    fused: bool = False
 
     @property
     def layout(self) -> str:
@@ -125,11 +102,6 @@ class FlightSettings:
 
 
 TRANSIT = 0.8  # of the largest yaw rate
-# names of settings that are the options as they are given
-AS_GIVEN = (
-    *("controller", "engine", "clock", "imu", "plant", "autopilot", "px4_params", "sim_address"),
-    *("gcs", "seed", "log_limit", "dry_run", "command", "domain", "tick_times", "fused"),
-)
 
 
 def settings(scenario: str | Path | None = None, **given: Any) -> FlightSettings:
@@ -184,7 +156,7 @@ def checked(o: FlightOptions) -> FlightSettings:
     clearance.check_standing(vehicle, scenario, o.plant)
     effects = presets.read(o.plant_preset, o.effects)
     made = FlightSettings(
-        **{name: getattr(o, name) for name in AS_GIVEN},
+        **{name: getattr(o, name) for name in KeptOptions.specs()},
         scenario=scenario,
         profile=profile,
         vehicle=vehicle,

@@ -1,11 +1,9 @@
 """The operator's commands to a running flight: services and topics of mission and bridge."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
@@ -38,15 +36,11 @@ AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
 PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as long for its answer
 
 
-def _itself(message: Any) -> Any:
-    return message
-
-
 class NoFlight(RuntimeError):
     """No flight answers; the text is one line and says what to do."""
 
     @classmethod
-    def seen_by(cls, node: Node, complaint: str) -> NoFlight:
+    def seen_by(cls, node: Node, complaint: str) -> Self:
         """Return the error of a client `node` for a complaint, as "no service /mission/start".
 
         It names the flights that run on this computer: they may be in another domain.
@@ -170,7 +164,7 @@ class Operator:
         """Serve clients for at most `seconds`, then take the received messages."""
         self._executor.spin_once(timeout_sec=seconds)
         for inlet, topic in self._readers.items():
-            for found in self._door.decoded(inlet, DECODE.get(topic, _itself)):
+            for found in self._door.decoded(inlet, DECODE.get(topic, lambda message: message)):
                 self._newest[topic] = found
 
     def _latest(self, topic: topics.Topic) -> Any:

@@ -1,11 +1,10 @@
 """Progress of a flight: a live panel on a terminal, otherwise plain lines."""
 
-from __future__ import annotations
-
 import math
 import re
 import time
 from collections.abc import Iterable, Sequence
+from typing import Self
 
 from rich.console import Group
 from rich.live import Live
@@ -33,7 +32,7 @@ class Progress(Observer):
         self._devices: dict[str, DeviceState] = {}
         self._status: FlightStatus | None = None
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:

@@ -1,6 +1,5 @@
 """Rebuild a result folder from its log alone: table, metrics, facts."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latenc
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.outcome import complete
-from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError
+from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError, known_json
 
 LOG, TABLE = "log.mcap", "timeseries.parquet"
 CUT_OFF = "the log ends before the mission was over"
@@ -35,12 +34,12 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     if out.resolve() != directory.resolve():
         folder.refuse_flight()
     facts = log_facts.read(log)
-    before = _json(directory / "info.json")
+    before = known_json(directory / "info.json")
     known = facts.info or before
     flown = _scenario(directory, facts, known, scenario)
     vehicle = _vehicle(known)
     outcome = read_flight(log, flown, vehicle=vehicle)
-    numbers = _json(directory / "logs" / "mujoco_sim.json")
+    numbers = known_json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
     latency, missed = outcome.latency_s, outcome.missed_ticks
     if (directory / "logs" / LABORATORY_FILE).exists():  # of a rehearsal
@@ -69,7 +68,7 @@ def series_of(directory: Path) -> timeseries.Series:
     if not log.exists():
         raise ResultFolderError(f"{directory} has neither {TABLE} nor {LOG}")
     facts = log_facts.read(log)
-    known = facts.info or _json(directory / "info.json")
+    known = facts.info or known_json(directory / "info.json")
     scenario = _scenario(directory, facts, known, None)
     flight = read_flight(log, scenario, known, _vehicle(known))
     flight.series.info["parameter_changes"] = flight.parameter_changes
@@ -104,11 +103,3 @@ def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) 
         write_text(out / name, texts[name])
     elif (directory / name).exists():
         write_text(out / name, (directory / name).read_text(encoding="utf-8"))
-
-
-def _json(file: Path) -> dict[str, Any]:
-    """Return the content of a JSON file, {} if it is missing or broken."""
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from uam_control.profiles.profile import Profile
 from uam_lab.experiments.compare import plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
 from uam_lab.experiments.trials.trial import Trial, TrialResult
@@ -28,19 +29,19 @@ HEAD = ("controller", "payload_kg", "seed", "outcome", "place_error_m", "why")
 OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 
-def budgets(rows: Sequence[plan.ComparedController]) -> dict[str, str]:
+def budgets(rows: Mapping[str, Profile]) -> dict[str, str]:
     """Return the source of each profile's values: the comment at the beginning of its file."""
     found = {}
-    for row in rows:
-        if not row.profile.file.is_file():
+    for label, profile in rows.items():
+        if not profile.file.is_file():
             continue
-        lines = row.profile.file.read_text(encoding="utf-8").splitlines()
+        lines = profile.file.read_text(encoding="utf-8").splitlines()
         head = []
         for line in lines:
             if not line.startswith("#"):
                 break
             head.append(line.lstrip("# "))
-        found[row.label] = " ".join(head)
+        found[label] = " ".join(head)
     return found
 
 

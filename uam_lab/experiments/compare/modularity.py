@@ -6,12 +6,11 @@ must be equal bit for bit. Flight: the vehicle also flies with the changed set, 
 reported.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -105,9 +104,7 @@ class ModularityEvidence:
     replays: tuple[Untouched, ...]
 
     @classmethod
-    def of(
-        cls, profile: Profile, series: Path, flights: Sequence[TrialResult]
-    ) -> ModularityEvidence:
+    def of(cls, profile: Profile, series: Path, flights: Sequence[TrialResult]) -> Self:
         """Return the evidence from the recorded flight `series` and the results of `trials`."""
         flight = timeseries.read(series)
         period = float(np.median(np.diff(flight.time)))

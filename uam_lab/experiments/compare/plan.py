@@ -1,7 +1,7 @@
 """The flights of a comparison."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -39,14 +39,6 @@ ROWS = {
 
 
 @dataclass(frozen=True)
-class ComparedController:
-    """One row of the tables."""
-
-    label: str
-    profile: Profile
-
-
-@dataclass(frozen=True)
 class Flights:
     """The flights of every row: each payload [kg] with each seed."""
 
@@ -65,8 +57,9 @@ class Flights:
 
 def entries(
     names: Sequence[str] = tuple(ROWS), vehicle: VehicleDescription | None = None
-) -> tuple[ComparedController, ...]:
-    """Return the rows of these `names`, keys of ROWS; vehicle: None for the default one.
+) -> dict[str, Profile]:
+    """Return the rows of these `names`, keys of ROWS: label → profile; vehicle: None for the
+    default one.
 
     Raises ProfileError for a profile that does not fit the vehicle.
     """
@@ -80,12 +73,10 @@ def entries(
         "px4_position": lambda: load_profile(str(proposed.file), PX4_PROFILE, vehicle=vehicle),
         "table1_weight": lambda: with_weight(load_profile(TABLE1, vehicle=vehicle), proposed),
     }
-    return tuple(
-        ComparedController(
-            ROWS[name], variants[name]() if name in variants else default_profile(name, vehicle)
-        )
+    return {
+        ROWS[name]: variants[name]() if name in variants else default_profile(name, vehicle)
         for name in names
-    )
+    }
 
 
 def frozen(profile: Profile, subsystems: Sequence[str] = SUBSYSTEMS) -> Profile:
@@ -105,12 +96,12 @@ def with_weight(profile: Profile, other: Profile) -> Profile:
     return profile_of(sections, Path(f"{profile.name}_weight.yaml"), profile.vehicle)
 
 
-def trials(rows: Sequence[ComparedController], flights: Flights, folder: Path) -> list[Trial]:
+def trials(rows: Mapping[str, Profile], flights: Flights, folder: Path) -> list[Trial]:
     """Return the flights of every row; those of the figures keep their series in `folder`."""
     return [
         Trial(
-            row.label,
-            row.profile,
+            label,
+            profile,
             mass,
             seed,
             flights.scenario,
@@ -118,7 +109,7 @@ def trials(rows: Sequence[ComparedController], flights: Flights, folder: Path) -
             engine=flights.engine,
             vehicle_changes=presets.added({}, flights.effects),
         )
-        for number, row in enumerate(rows)
+        for number, (label, profile) in enumerate(rows.items())
         for mass in flights.payloads
         for seed in flights.seeds
     ]

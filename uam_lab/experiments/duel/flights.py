@@ -21,7 +21,7 @@ from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
 from uam_lab.flights.direct.flight import DirectFlight
-from uam_lab.records.results import metrics, phase_errors
+from uam_lab.records.results import phase_errors
 from uam_lab.records.results.templates import markdown_table
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
@@ -166,8 +166,8 @@ def measure(trial: Trial, change: Callable[[DirectFlight], None] | None = None) 
     outcome = recorded(trial, change)
     figures = figures_of(trial, outcome, outcome.abort_reason)
     ended, picks = classify(outcome.series, figures), bool(trial.payload_mass)
-    rows = judged(outcome.series, trial.load_scenario())
-    rms = phase_errors.figures(outcome.series, rows, metrics.GROUPS)["rms"] if rows.any() else {}
+    rows = judged(outcome.series, trial.flown_scenario)
+    rms = phase_errors.figures(outcome.series, rows)["rms"] if rows.any() else {}
     rms = {} if ended != COMPLETED else figures["rms"] if picks else rms
     return DuelResult(
         *(trial.label, Path(trial.scenario).stem, trial.seed, trial.drawn["delay"]),
@@ -245,7 +245,6 @@ def mean(values: Iterable[float]) -> float:
 
 
 def _errors(duel: Duel, results: Results, tasks: Sequence[str], measure: int) -> str:
-    """Return rows × tasks of a measure."""
     rows = [
         [label, *(_cell(duel, results, label, task, MEASURES, measure) for task in tasks)]
         for label in dict.fromkeys((*duel.published, *duel.rows))
@@ -254,7 +253,6 @@ def _errors(duel: Duel, results: Results, tasks: Sequence[str], measure: int) ->
 
 
 def _picks(duel: Duel, results: Results, task: str) -> str:
-    """Return rows × measures of a pick."""
     rows = []
     for label in dict.fromkeys((*duel.published, *duel.rows)):
         own = [r for r in _of(results, label, task) if r.done]

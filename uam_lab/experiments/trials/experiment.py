@@ -4,14 +4,15 @@ They are flown by workers, or one after another in this process where they need 
 """
 
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from uam_lab.experiments.trials.carried import arrived, carried
+from uam_control.vehicle import VehicleDescription
+from uam_lab.experiments.trials.carried import arrived, carried, inputs
 from uam_lab.experiments.trials.counting import Counting
 from uam_lab.experiments.trials.rows import Rows, RowTable
 from uam_lab.experiments.trials.trial import Trial, measure
@@ -38,6 +39,26 @@ class Experiment:
     inputs: Mapping[str, str]
     place: Workplace
     work: Work = measure
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        out: Path,
+        rows: Rows,
+        place: Workplace,
+        vehicle: VehicleDescription,
+        scenario: str,
+        given: Mapping[str, object],
+        work: Work = measure,
+    ) -> Self:
+        """Return an experiment with its table in the folder `out`; given: see `carried.inputs`."""
+        of = inputs(vehicle, scenario, given)
+        return cls(name, out / "flights.parquet", rows, of, place, work)
+
+    def fly_all(self, trials: Sequence[Any], describe: Callable[[Any], str]) -> list[Any]:
+        """Fly these trials, by their numbers, as `fly`; return the results in their order."""
+        return list(self.fly(range(len(trials)), trials.__getitem__, describe).values())
 
     def fly(
         self,

@@ -22,7 +22,8 @@ from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
 from uam_lab.records.results import metrics
-from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.phase_errors import GROUPS
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults import PROCESS, Schedule
@@ -54,12 +55,9 @@ class Trial:
     carried: Carried | None = None
     drawn: dict[str, float] = field(default_factory=dict)
 
-    def load_scenario(self) -> Scenario:
-        """Return the scenario, for the vehicle; it is read once. Raises ScenarioError."""
-        return self._scenario
-
     @cached_property
-    def _scenario(self) -> Scenario:
+    def flown_scenario(self) -> Scenario:
+        """The scenario, for the vehicle; it is read once. Raises ScenarioError."""
         if self.carried is not None and self.carried.scenario is not None:
             return self.carried.scenario
         return load_scenario(self.scenario, self.profile.vehicle)
@@ -111,7 +109,7 @@ def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> O
 
     Raises ConfigurationError, ScenarioError.
     """
-    scenario = trial.load_scenario()
+    scenario = trial.flown_scenario
     if trial.engine == "ros":
         return _fly_nodes(trial, scenario)
     vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
@@ -120,15 +118,8 @@ def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> O
     )
     if change is not None:
         change(flight)
-    recording = flight.run()
-    return Outcome(
-        series=recording.series({"controller": trial.label}) if recording.count else None,
-        abort_reason=flight.mission.output.abort_reason,
-        failure=flight.ended_by,
-        transitions=transitions(flight.mission.changes),
-        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
-        faults=flight.fault_records,
-    )
+    flight.run()
+    return flight.outcome({"controller": trial.label})
 
 
 def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
@@ -177,7 +168,7 @@ def recorded(trial: Trial, change: Callable[[DirectFlight], None] | None = None)
 
 def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, Any]:
     """Return the content of metrics.json for a flight with a recorded series."""
-    scenario = trial.load_scenario()
+    scenario = trial.flown_scenario
     info = {
         "payload_mass_kg": trial.payload_mass,
         "drop_point": scenario.drop_point,
@@ -200,7 +191,7 @@ def measure(trial: Trial) -> TrialResult:
     if trial.keep is not None:
         series.write(trial.keep)
     figures = figures_of(trial, outcome, outcome.reason)
-    flown, landing = series.flown, trial.load_scenario().landing
+    flown, landing = series.flown, trial.flown_scenario.landing
     end = classify(series, figures)
     return TrialResult(
         label=trial.label,
@@ -227,7 +218,7 @@ def result_rows(joints: int, drawn: Sequence[str] = ()) -> Rows:
 
 
 def _row(groups: dict[str, list[float | None]]) -> np.ndarray:
-    values = [value for key, _, _ in metrics.GROUPS for value in groups[key]]
+    values = [value for key, _, _ in GROUPS for value in groups[key]]
     return np.array([np.nan if value is None else value for value in values])
 
 

@@ -10,7 +10,7 @@ from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.flight_settings import AUTOPILOT_IMU, FlightSettings
 from uam_lab.flights.observer import FlightStatus, Observer
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
+from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_sim_bridge.plant import Vehicle
 
@@ -38,17 +38,8 @@ def fly(
         flight.run(lambda *_: _report(flight, begin, observer, stop))
     except _Stopped:
         pass
-    output = flight.mission.output
-    return Outcome(
-        series=flight.recording.series() if flight.recording.count else None,
-        wall_s=time.monotonic() - begin,
-        abort_reason=output.abort_reason,
-        failure=flight.ended_by,
-        interrupted=stop.raised and not output.done,
-        transitions=transitions(flight.mission.changes),
-        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
-        faults=flight.fault_records,
-    )
+    wall, interrupted = time.monotonic() - begin, stop.raised and not flight.mission.output.done
+    return flight.outcome(wall_s=wall, interrupted=interrupted)
 
 
 class _Stopped(Exception):

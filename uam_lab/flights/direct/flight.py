@@ -4,7 +4,7 @@ One pass of the loop is one control tick, in the order of a lockstep flight with
 stages of `ControlTick`, autopilot, physics. Most passes are compiled, see `compiled_ticks`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from uam_control.mission import Mission, Scenario
@@ -18,6 +18,7 @@ from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.compiled_ticks import CompiledTicks
 from uam_lab.flights.direct.record import TickRecorder
+from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
 from uam_lab.records.results.timeseries import FlightTable
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -138,10 +139,18 @@ class DirectFlight:
         """Whether the autopilot is armed."""
         return self.autopilot.autopilot.commander.armed
 
-    @property
-    def fault_records(self) -> list[dict[str, Any]]:
-        """The injected faults; see `faults.timeline.record`."""
-        return self._faults.records if self._faults else []
+    def outcome(self, info: Mapping[str, Any] | None = None, **more: Any) -> Outcome:
+        """Return what the flight has come to; info: facts for its series; more: of the outcome."""
+        recording, mission = self.recording, self.mission
+        return Outcome(
+            series=recording.series(info) if recording.count else None,
+            abort_reason=mission.output.abort_reason,
+            failure=self.ended_by,
+            transitions=transitions(mission.changes),
+            grasps=grasp_decisions(mission.grasps, mission.changes),
+            faults=self._faults.records if self._faults else [],
+            **more,
+        )
 
     def advance(self, enough: int, most: int) -> None:
         """Fly at least one tick, and until `enough` are flown; at most `most`, which is not less.

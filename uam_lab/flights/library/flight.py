@@ -389,7 +389,6 @@ class Flight:
 
 
 def _engine(name: str) -> Engine:
-    """Return the engine's `fly`."""
     if name == "direct":
         from uam_lab.flights.direct.engine import fly as engine
     else:

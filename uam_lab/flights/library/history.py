@@ -4,14 +4,14 @@ import asyncio
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from itertools import islice
 
 from uam_control.mission.mission_output import PHASES
 from uam_control.supervision import State
 from uam_lab.flights.library.flight_result import NotInTime
 from uam_lab.flights.node_options import SettingsError
-from uam_lab.flights.observer import DeviceState, FlightStatus, Observer
+from uam_lab.flights.observer import FlightStatus, Observer
 
 Condition = Callable[[FlightStatus], bool]
 Kind = str | Condition
@@ -24,6 +24,7 @@ class History(Observer):
 
     def __init__(self, further: Observer) -> None:
         self._further = further
+        self.bring_up, self.finish = further.bring_up, further.finish
         self._news = threading.Condition()
         self.statuses: deque[FlightStatus] = deque(maxlen=KEPT)
         self._count = 0  # of all statuses so far
@@ -45,10 +46,6 @@ class History(Observer):
             self._news.notify_all()
         self._further.started(domain)
 
-    def bring_up(self, devices: Sequence[DeviceState]) -> None:
-        """Pass on the state of the devices."""
-        self._further.bring_up(devices)
-
     def update(self, status: FlightStatus) -> None:
         """Store a status."""
         with self._news:
@@ -56,10 +53,6 @@ class History(Observer):
             self._count += 1
             self._news.notify_all()
         self._further.update(status)
-
-    def finish(self) -> None:
-        """Pass on that no further status will come."""
-        self._further.finish()
 
     def end(self) -> None:
         """Note the end of the flight."""

@@ -1,10 +1,9 @@
 """An additional node in the ROS domain of a running flight, with its own ROS context."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
@@ -70,7 +69,7 @@ class Guest:
         self.node.destroy_node()
         rclpy.shutdown(context=self.context)
 
-    def __enter__(self) -> Guest:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:

@@ -1,11 +1,9 @@
 """Requests to end a flight early: by a program, or by Ctrl-C, which is only counted."""
 
-from __future__ import annotations
-
 import os
 import queue
 import signal
-from typing import Any
+from typing import Any, Self
 
 INTERRUPTED = 128 + signal.SIGINT  # exit status
 OUTPUTS = (1, 2)  # file descriptors of standard output and error
@@ -49,7 +47,7 @@ class Interrupts(StopRequest):
         self._before: dict[int, object] = {}
         self._terminals: list[int] = []  # file descriptors
 
-    def __enter__(self) -> Interrupts:
+    def __enter__(self) -> Self:
         self._terminals = [output for output in OUTPUTS if os.isatty(output)]
         handlers = dict.fromkeys(SIGNALS, self.repeat) | {signal.SIGHUP: self._hung_up}
         if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:

@@ -1,6 +1,5 @@
 """What the devices of a rehearsal carried: rates and latencies, from /diagnostics in its log."""
 
-import json
 import socket
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -9,8 +8,9 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from uam_lab.records.recording.logged_topics import LABORATORY_FILE, statistics
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE
 from uam_lab.records.recording.mcap_reader import UnreadableLog, read_log
+from uam_lab.records.results.result_folder import known_json
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
@@ -52,7 +52,7 @@ def read(log: Path, logs: Path) -> dict[str, Any]:
         found = {}
     data = found[topics.DIAGNOSTICS.name].messages if found else []
     figures = of_reports(values_of(_reports(data)))
-    return figures | of_laboratory(statistics(logs / LABORATORY_FILE))
+    return figures | of_laboratory(known_json(logs / LABORATORY_FILE))
 
 
 def _reports(data: Iterable[bytes]) -> Iterator[DiagnosticArray]:
@@ -135,14 +135,6 @@ def lines(figures: Mapping[str, Any]) -> list[str]:
 def median(numbers: list[float]) -> float:
     """Return the median; of an even number the lower of the two in the middle."""
     return sorted(numbers)[(len(numbers) - 1) // 2]
-
-
-def saved(folder: Path) -> dict[str, Any]:
-    """Return the figures in a result folder, {} without them."""
-    try:
-        return json.loads((folder / NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
 
 
 def free_udp_port() -> int:

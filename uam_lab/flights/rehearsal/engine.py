@@ -5,40 +5,34 @@
 It releases all processes, devices and ports, also after an error.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from uam_lab.flights.conclude import conclude
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flights.observer import Observer
-from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import logged
-from uam_lab.flights.ros.supervise import StatusListener
+from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import settings_of
 from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse, start_nodes
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
-from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies, statistics
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results.outcome import Outcome
-from uam_lab.records.results.result_folder import ResultFolder, write_json
+from uam_lab.records.results.result_folder import ResultFolder, known_json, write_json
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.nodes.laboratory import READY
-from uam_sim_bridge.ports import Ports, Reservation
+from uam_sim_bridge.ports import Reservation
 
 REFUSED = "start refused: "
 DEVICES, LOGS = "devices", "logs"  # in the result folder
@@ -61,7 +55,7 @@ def read_outcome(
 
     failure: the failed node, if any; refused: why the mission was not started, "" if it was.
     """
-    numbers = statistics(folder.path / LOGS / LABORATORY_FILE)
+    numbers = known_json(folder.path / LOGS / LABORATORY_FILE)
     lost = numbers.get("lost_s")
     notes = [f"the plant could not keep real time: {lost:.2f} s lost"] if lost else []
     outcome = logged(settings, folder, failure, interrupted, notes)
@@ -75,56 +69,6 @@ def read_outcome(
     if not outcome.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome
-
-
-class RehearsalEngine:
-    """`fly` is an engine of `library.Flight`."""
-
-    def __init__(self, lab: Lab, checklist: bool) -> None:
-        """checklist: whether the lists are required and a person does them."""
-        self._lab, self._checklist = lab, checklist
-
-    def fly(
-        self, settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
-    ) -> Outcome:
-        """Rehearse, and record to `folder`; a failure or a requested stop keeps the recording.
-
-        settings: see `settings_of`. Raises PortError if no instance is free, LabError,
-        AddressError.
-        """
-        logs, devices = folder.path / LOGS, (folder.path / DEVICES).absolute()
-        for each in (logs, devices):
-            each.mkdir(exist_ok=True)
-        with Reservation(None, own_autopilot=False) as reservation:
-            ports = reservation.ports
-            document = laboratory_process.emulated_lab(
-                self._lab, devices, device_figures.free_udp_port()
-            )
-            lab = laboratory_process.write_lab(document, self._lab.file, folder.path)
-            own = settings_of(lab, settings.command)
-            settings = replace(settings, link=own.link, autopilot=own.autopilot)
-            modules = vehicle_nodes.processes(lab)
-            supervise.prepare([*modules.values(), LABORATORY_MODULE], observer)
-            sections = vehicle_nodes.parameters(lab, settings, folder)
-            required = laboratory_process.required_parameters(settings.px4, logs)
-            sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
-            _prepare_checklist(sections, self._checklist)
-            sections[LABORATORY] = laboratory_process.parameters(
-                lab, settings, devices, logs, ports, self._checklist
-            )
-            node_arguments.write(sections, settings, folder)
-            rehearsal = _Rehearsal(lab, settings, folder, ports, observer, stop, self._checklist)
-            failure = rehearsal.run(devices)
-        refused = rehearsal.refused
-        if failure is not None and not rehearsal.started and failure.name not in OWN:
-            refused = refused or str(failure)
-        outcome = read_outcome(settings, folder, failure, refused, stop.raised)
-        figures = device_figures.read(folder.log, logs)
-        write_json(folder.path / device_figures.NAME, figures)
-        if not settings.faults:
-            rate = 1.0 / settings.vehicle.control_period
-            outcome.notes += device_figures.slow_computer(figures, rate)
-        return outcome
 
 
 def _prepare_checklist(sections: dict[str, dict[str, Any]], required: bool) -> None:
@@ -142,106 +86,78 @@ class _Rehearsal:
     `started`: whether the mission has accepted the start.
     """
 
-    def __init__(
-        self,
-        lab: Lab,
-        settings: FlightSettings,
-        folder: ResultFolder,
-        ports: Ports,
-        observer: Observer,
-        stop: StopRequest,
-        checklist: bool,
-    ) -> None:
-        self._lab, self._settings = lab, settings
-        self._folder, self._ports, self._observer, self._stop = folder, ports, observer, stop
+    def __init__(self, lab: Lab, flight: FlightRun, checklist: bool) -> None:
+        self._lab, self._flight = lab, flight
         self.refused, self.started = "", False
         self._lists = checklist and CHECKLIST in vehicle_nodes.modules(lab)
 
     def run(self, devices: Path) -> NodeFailed | None:
         """Run all processes until the laboratory ends or the start is refused."""
-        publishers = vehicle_nodes.publishers(self._lab)
 
         def start(children: Processes) -> None:
-            if self._start_laboratory(children, devices, publishers):
+            if self._start_laboratory(children, devices):
                 left_out = () if self._lists else (CHECKLIST,)
-                needed = self._lab, self._settings, self._folder, publishers
                 # a rehearsal is judged by its log
-                start_nodes(children, *needed, without=left_out, optional=(wiring.COCKPIT,))
+                start_nodes(children, self._lab, self._flight, left_out, (wiring.COCKPIT,))
 
         failure, _ = supervise.run(
-            supervise.FlightRun(
-                self._settings, self._folder, self._ports, self._observer, self._stop
-            ),
-            publishers,
+            self._flight,
             start,
             lambda children: [
-                f"{len(children.names)} processes in ROS domain {self._ports.domain}; "
+                f"{len(children.names)} processes in ROS domain {self._flight.ports.domain}; "
                 f"devices in {devices}"
             ],
             lambda children, listener: RehearsalCourse(self, children, listener),
         )
         return failure
 
-    def _start_laboratory(self, children: Processes, devices: Path, publishers: str) -> bool:
+    def _start_laboratory(self, children: Processes, devices: Path) -> bool:
         """Start laboratory and autopilot; return whether the devices are there.
 
         Raises NodeFailed.
         """
-        arguments = supervise.ros_arguments(self._settings, self._folder, publishers)
-        children.start(LABORATORY, LABORATORY_MODULE, arguments, may_end=True)
+        settings, folder, ports, _, stop, _ = self._flight
+        children.start(LABORATORY, LABORATORY_MODULE, self._flight.ros_arguments, may_end=True)
         patience = time.monotonic() + DEVICES_WAIT
         while not (devices / READY).exists():
             children.check()
             if not children.running(LABORATORY) or time.monotonic() > patience:
-                raise NodeFailed(LABORATORY, 0, self._folder.path / LOGS / f"{LABORATORY}.log")
-            if self._stop.raised:
+                raise NodeFailed(LABORATORY, 0, folder.path / LOGS / f"{LABORATORY}.log")
+            if stop.raised:
                 return False
             time.sleep(POLL)
-        module, own = laboratory_process.autopilot(
-            self._lab, self._settings, devices, self._folder.path, self._ports
-        )
+        module, own = laboratory_process.autopilot(self._lab, settings, devices, folder.path, ports)
         children.start(AUTOPILOT, module, own, may_end=True)
         return True
 
     def vehicle_course(self, listener: StatusListener) -> VehicleCourse:
         """Return the course of the vehicle's nodes."""
-        return VehicleCourse(self._lab, listener, self._guest, self._observer, self._stop)
+        return VehicleCourse(self._lab, self._flight, listener)
 
     def starter(self) -> Starter:
         """Return the person who starts the mission."""
-        return Starter(self._guest, self._lists)
+        return Starter(self._flight.guest, self._lists)
 
     def say(self, text: str) -> None:
         """Show one line."""
-        self._observer.message(text)
-
-    @property
-    def _guest(self) -> Callable[[str], Guest]:
-        surroundings = environment(self._ports.domain, self._folder.path / LOGS)
-        return lambda name: Guest(name, surroundings, self._ports.domain)
+        self._flight.observer.message(text)
 
 
-class RehearsalCourse:
-    """A `Course`: that of the vehicle, with a laboratory that ends it and a person who starts it.
-
-    A context manager.
-    """
+class RehearsalCourse(Course):
+    """That of the vehicle, with a laboratory that ends it and a person who starts it."""
 
     def __init__(
         self, rehearsal: _Rehearsal, children: Processes, listener: StatusListener
     ) -> None:
+        super().__init__()
         self._rehearsal, self._children = rehearsal, children
         self._vehicle, self._starter = rehearsal.vehicle_course(listener), rehearsal.starter()
-        self._open = ExitStack()
         self._said, self._say_at = "", 0.0  # [s] time.monotonic()
 
-    def __enter__(self) -> RehearsalCourse:
-        self._open.enter_context(self._vehicle)
-        self._open.enter_context(self._starter)
+    def __enter__(self) -> Self:
+        self.enter_context(self._vehicle)
+        self.enter_context(self._starter)
         return self
-
-    def __exit__(self, *exception) -> None:
-        self._open.close()
 
     def goes_on(self) -> bool:
         """Return whether the laboratory and the vehicle's flight go on."""
@@ -271,5 +187,49 @@ def fly(
     """
     prepare(observer.message)
     folder = ResultFolder.create(settings.scenario.name, "rehearsal", settings.out)
-    outcome = RehearsalEngine(lab, checklist).fly(settings, folder, observer, stop)
+    outcome = _rehearsed(lab, settings, folder, observer, stop, checklist)
     return folder.path, outcome, conclude(settings, folder, outcome)
+
+
+def _rehearsed(
+    given: Lab,
+    settings: FlightSettings,
+    folder: ResultFolder,
+    observer: Observer,
+    stop: StopRequest,
+    checklist: bool,
+) -> Outcome:
+    """Rehearse, and record to `folder`; a failure or a requested stop keeps the recording."""
+    logs, devices = folder.path / LOGS, (folder.path / DEVICES).absolute()
+    for each in (logs, devices):
+        each.mkdir(exist_ok=True)
+    with Reservation(None, own_autopilot=False) as reservation:
+        ports = reservation.ports
+        document = laboratory_process.emulated_lab(given, devices, device_figures.free_udp_port())
+        lab = laboratory_process.write_lab(document, given.file, folder.path)
+        own = settings_of(lab, settings.command)
+        settings = replace(settings, link=own.link, autopilot=own.autopilot)
+        modules = vehicle_nodes.processes(lab)
+        supervise.prepare([*modules.values(), LABORATORY_MODULE], observer)
+        sections = vehicle_nodes.parameters(lab, settings, folder)
+        required = laboratory_process.required_parameters(settings.px4, logs)
+        sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
+        _prepare_checklist(sections, checklist)
+        sections[LABORATORY] = laboratory_process.parameters(
+            lab, settings, devices, logs, ports, checklist
+        )
+        node_arguments.write(sections, settings, folder)
+        publishers = vehicle_nodes.publishers(lab)
+        flight = FlightRun(settings, folder, ports, observer, stop, publishers)
+        rehearsal = _Rehearsal(lab, flight, checklist)
+        failure = rehearsal.run(devices)
+    refused = rehearsal.refused
+    if failure is not None and not rehearsal.started and failure.name not in OWN:
+        refused = refused or str(failure)
+    outcome = read_outcome(settings, folder, failure, refused, stop.raised)
+    figures = device_figures.read(folder.log, logs)
+    write_json(folder.path / device_figures.NAME, figures)
+    if not settings.faults:
+        rate = 1.0 / settings.vehicle.control_period
+        outcome.notes += device_figures.slow_computer(figures, rate)
+    return outcome

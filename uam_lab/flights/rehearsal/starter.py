@@ -1,17 +1,14 @@
 """Starts the mission of a rehearsal as a person does: when the lists have passed, `uam start`."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable
+from typing import Self
 
-from diagnostic_msgs.msg import DiagnosticArray
-
-from uam_lab.flights.operator import NoFlight, Operator
+from uam_lab.flights.operator import DECODE, NoFlight, Operator
 from uam_lab.flights.processes.guest import Guest
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.status import OK
+from uam_msgs_py.messages.checklist import PASSED
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.door import Door
 
@@ -37,7 +34,7 @@ class Starter(threading.Thread):
         self._ended = threading.Event()
         self.started, self.refused, self.waits_for = False, "", "the nodes"
 
-    def __enter__(self) -> Starter:
+    def __enter__(self) -> Self:
         self.start()
         return self
 
@@ -54,10 +51,10 @@ class Starter(threading.Thread):
             progress, asked = time.monotonic(), 0.0
             while not self._ended.wait(LOOK) and not self.started:
                 now = time.monotonic()
-                for message in door.messages(lists):
-                    passed = passed or list_passed(message)
-                    self.waits_for = list_text(message)
-                    if (count := passed_items(message)) > most:  # not those that come and go
+                for (_, state), items in door.decoded(lists, DECODE[topics.CHECKLIST]):
+                    passed, self.waits_for = passed or state.passed, state.summary
+                    count = sum(item.result == PASSED for item in items)
+                    if count > most:  # not those that come and go
                         most, progress = count, now
                 if now - progress > self._patience:
                     self.refused = self.waits_for
@@ -68,28 +65,3 @@ class Starter(threading.Thread):
                         self.started, self.waits_for = operator.command("start")
                     except NoFlight as error:
                         self.waits_for = str(error)
-
-
-def list_passed(message: DiagnosticArray) -> bool:
-    """Return whether all items have passed."""
-    return _value(message, "passed") == "True"
-
-
-def list_text(message: DiagnosticArray) -> str:
-    """Return what is open or has failed, in one line."""
-    failing = _value(message, "failing")
-    text = message.status[0].message if message.status else ""
-    return f"{text}: {failing}" if failing and failing not in text else text
-
-
-def passed_items(message: DiagnosticArray) -> int:
-    """Return the number of items that have passed."""
-    return sum(one.level == OK for one in message.status[1:])
-
-
-def _value(message: DiagnosticArray, key: str) -> str:
-    for status in message.status[:1]:
-        for pair in status.values:
-            if pair.key == key:
-                return pair.value
-    return ""

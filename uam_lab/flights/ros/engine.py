@@ -11,12 +11,11 @@ tick waits for (SCHED_BATCH), and are interrupted by them (nice). Where the node
 real-time priority, plant and autopilot have it, too: they wait for each other.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
@@ -29,7 +28,7 @@ from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import read_outcome
 from uam_lab.flights.ros.process_fault_injection import ProcessFaults
-from uam_lab.flights.ros.supervise import StatusListener
+from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
@@ -42,7 +41,7 @@ from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.plant_health import TICKS, WAITING
 from uam_sim_bridge.nodes.plant_options import NOT_READY
 from uam_sim_bridge.paced_clock import Patience
-from uam_sim_bridge.ports import Ports, Reservation
+from uam_sim_bridge.ports import Reservation
 
 LONGEST_STOP = 60.0  # [s] a process may be stopped; no time limit for one that runs
 LOOK_PERIOD = 0.5  # [s] between two looks at the processes
@@ -152,12 +151,14 @@ def fly(
             port = sections[wiring.COCKPIT]["port"]
             observer.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
         last: list[FlightStatus] = []
-        failure = _supervise(settings, folder, ports, observer, stop, last)
+        publishers = node_arguments.publishers(settings)
+        flight = FlightRun(settings, folder, ports, observer, stop, publishers)
+        failure = _supervise(flight, last)
         if failure is not None and failure.status == NOT_READY and not settings.foreign:
             # on an overloaded machine the middleware may fail to connect all nodes
             observer.message(f"{failure}; starting again")
             _put_aside(folder)
-            failure = _supervise(settings, folder, ports, observer, stop, last)
+            failure = _supervise(flight, last)
     outcome = read_outcome(settings, folder, failure, stop.raised)
     if outcome.failure and failure is None and last and last[-1].time < 0.0:
         outcome.failure = f"no take-off ({outcome.failure}); autopilot {last[-1].autopilot}"
@@ -174,35 +175,24 @@ def _put_aside(folder: ResultFolder) -> None:
         file.rename(aside / file.name)
 
 
-def _supervise(
-    settings: FlightSettings,
-    folder: ResultFolder,
-    ports: Ports,
-    observer: Observer,
-    stop: StopRequest,
-    last: list[FlightStatus],
-) -> NodeFailed | None:
+def _supervise(flight: FlightRun, last: list[FlightStatus]) -> NodeFailed | None:
     """Run the processes until the plant ends; return the failure.
 
     last: receives the newest status of a flight without a failure.
     """
     failure, listener = supervise.run(
-        supervise.FlightRun(settings, folder, ports, observer, stop),
-        node_arguments.publishers(settings),
-        lambda children: _start(children, settings, folder, ports),
-        lambda children: _announcement(children, settings, ports),
-        lambda children, listener: SimulatedCourse(settings, children, listener, observer, stop),
+        flight,
+        partial(_start, flight),
+        partial(_announcement, flight),
+        partial(SimulatedCourse, flight),
     )
     if failure is None and listener is not None:
         last[:] = listener.newest
     return failure
 
 
-def _start(
-    children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
-) -> None:
-    publishers = node_arguments.publishers(settings)
-    arguments = supervise.ros_arguments(settings, folder, publishers)
+def _start(flight: FlightRun, children: Processes) -> None:
+    settings, ports, arguments = flight.settings, flight.ports, flight.ros_arguments
     for name, module in node_arguments.modules(settings).items():
         children.start(
             name,
@@ -214,13 +204,14 @@ def _start(
             nodes=node_arguments.nodes_in(name, settings),
             place=placing(settings, ports.instance, name),
         )
-    module, own = node_arguments.autopilot(settings, folder, ports)
+    module, own = node_arguments.autopilot(settings, flight.folder, ports)
     if module:
         place = placing(settings, ports.instance, AUTOPILOT)
         children.start(AUTOPILOT, module, own, may_end=True, place=place)
 
 
-def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -> Iterator[str]:
+def _announcement(flight: FlightRun, children: Processes) -> Iterator[str]:
+    settings, ports = flight.settings, flight.ports
     yield (
         f"{len(children.names)} processes in ROS domain {ports.domain}, "
         f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
@@ -239,23 +230,18 @@ def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -
         yield f"waiting for uam start{why}"
 
 
-class SimulatedCourse:
+class SimulatedCourse(Course):
     """A flight in simulation: it goes on until the plant ends; faults of processes are injected.
 
     In lockstep a process that stays stopped ends it, see `Waits`.
     """
 
-    def __init__(
-        self,
-        settings: FlightSettings,
-        children: Processes,
-        listener: StatusListener,
-        observer: Observer,
-        stop: StopRequest,
-    ) -> None:
-        self._children, self._listener, self._stop = children, listener, stop
-        self._faults = _process_faults(settings, children, listener, observer)
-        self._waits = Waits(children, listener, observer) if settings.clock == LOCKSTEP else None
+    def __init__(self, flight: FlightRun, children: Processes, listener: StatusListener) -> None:
+        super().__init__()
+        self._children, self._listener, self._stop = children, listener, flight.stop
+        self._faults = self.enter_context(_process_faults(flight, children, listener))
+        lockstep = flight.settings.clock == LOCKSTEP
+        self._waits = Waits(children, listener, flight.observer) if lockstep else None
 
     def goes_on(self) -> bool:
         """Begin and end the due faults; return whether the plant runs and nobody stops it.
@@ -270,19 +256,12 @@ class SimulatedCourse:
             self._waits.look()
         return self._children.running(wiring.PLANT) and not self._stop.raised
 
-    def __enter__(self) -> SimulatedCourse:
-        self._faults.__enter__()
-        return self
-
-    def __exit__(self, *exception) -> None:
-        self._faults.__exit__(*exception)
-
 
 def _process_faults(
-    settings: FlightSettings, children: Processes, listener: StatusListener, observer: Observer
+    flight: FlightRun, children: Processes, listener: StatusListener
 ) -> ProcessFaults:
     """Return the process faults; their start and end are printed and recorded."""
-    schedule = settings.faults.only(PROCESS)
+    settings, schedule = flight.settings, flight.settings.faults.only(PROCESS)
     topics: list[FaultTopic] = []  # made with the first fault
 
     def announce(one: FaultState) -> None:
@@ -290,7 +269,7 @@ def _process_faults(
         node = one.fault.values["node"]
         process = children.process_of(node)
         affected = node if process == node else f"{node}, hence of the process {process},"
-        observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
+        flight.observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
         if not topics:
             topics.append(FaultTopic(listener.node))
         topics[0].publish(listener.stamp, [one])

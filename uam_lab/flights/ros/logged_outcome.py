@@ -3,10 +3,10 @@
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.processes.processes import NodeFailed
 from uam_lab.records.recording.log_reader import read_flight
-from uam_lab.records.recording.logged_topics import RECORDER, losses, statistics
+from uam_lab.records.recording.logged_topics import RECORDER, losses
 from uam_lab.records.recording.mcap_reader import UnreadableLog
 from uam_lab.records.results.outcome import Outcome
-from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.results.result_folder import ResultFolder, known_json
 
 
 def read_outcome(
@@ -17,7 +17,7 @@ def read_outcome(
 ) -> Outcome:
     """Return the outcome of the flight in `folder`; failure: the failed node, if any."""
     logs, notes = folder.path / "logs", []
-    numbers = statistics(logs / "mujoco_sim.json")
+    numbers = known_json(logs / "mujoco_sim.json")
     realtime = settings.clock == "realtime"
     late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
     if late and realtime:
@@ -30,7 +30,7 @@ def read_outcome(
             outcome.missed_ticks = numbers.get("missed_ticks")
     if outcome.series is None or outcome.done or outcome.partial:
         return outcome
-    full = statistics(logs / RECORDER).get("ended")
+    full = known_json(logs / RECORDER).get("ended")
     ended = full or numbers.get("ended_by")
     if settings.dry_run and ended and not full:
         outcome.abort_reason = f"dry run, {ended}: nothing was armed"

@@ -5,8 +5,6 @@ simulated second late. Its duration is wall time, because in lockstep the flight
 stopped process. A fault of a node affects its process, with all nodes in it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -15,6 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Self
 
 import psutil
 
@@ -123,7 +122,7 @@ class ProcessFaults:
         if hindrance is not None:
             hindrance.end()
 
-    def __enter__(self) -> ProcessFaults:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:

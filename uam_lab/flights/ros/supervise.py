@@ -6,8 +6,8 @@ Its status comes by two topics, twice a second.
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from typing import Any, NamedTuple, Protocol
+from contextlib import ExitStack
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
@@ -163,12 +163,12 @@ class RestartTopic:
         self._diagnostics.publish(diagnostic(stamp, self._prefix + node, WARN, text, {}))
 
 
-class Course(Protocol):
+class Course(ExitStack):
     """What a kind of flight does besides: a context manager, polled while the flight goes on."""
 
     def goes_on(self) -> bool:
         """Do what is due; return whether the flight goes on."""
-        ...
+        raise NotImplementedError
 
 
 def prepare(modules: Iterable[str], observer: Observer) -> None:
@@ -181,33 +181,55 @@ def prepare(modules: Iterable[str], observer: Observer) -> None:
 
 
 class FlightRun(NamedTuple):
-    """One flight as every engine over ROS has it."""
+    """One flight as every engine over ROS has it; publishers: of its topics, see `rightful`."""
 
     settings: FlightSettings
     folder: ResultFolder
     ports: Ports
     observer: Observer
     stop: StopRequest
+    publishers: str
+
+    @property
+    def surroundings(self) -> dict[str, str]:
+        """The variables of its processes."""
+        return environment(self.ports.domain, self.folder.path / "logs")
+
+    @property
+    def ros_arguments(self) -> list[str]:
+        """The ROS arguments that every node has."""
+        # the nodes' output already contains their log messages; separate files would repeat them
+        return [
+            *(
+                "--ros-args",
+                "--disable-external-lib-logs",
+                "-p",
+                f"{PUBLISHERS}:={self.publishers}",
+            ),
+            *("--params-file", str(self.folder.parameters), "-r"),
+            f"__ns:={self.settings.namespace}",
+        ]
+
+    def guest(self, name: str) -> Guest:
+        """Return a further node in the flight's graph, for `with`."""
+        common = node_arguments.common_remappings(self.settings)
+        return Guest(name, self.surroundings, self.ports.domain, self.settings.namespace, common)
 
 
 def run(
     flight: FlightRun,
-    publishers: str,
     start: Callable[[Processes], None],
     announce: Callable[[Processes], Iterable[str]],
-    course: Callable[[Processes, StatusListener], AbstractContextManager[Course]],
+    course: Callable[[Processes, StatusListener], Course],
 ) -> tuple[NodeFailed | None, StatusListener | None]:
     """Start all processes, watch them while the course goes on, stop them.
 
-    publishers: see `rightful`; start: starts them; announce: returns lines about the start;
-    course: see `Course`. Returns the failure, if any, and the listener with the newest status.
+    start: starts them; announce: returns lines about the start; course: see `Course`. Returns the
+    failure, if any, and the listener with the newest status.
     """
-    settings, folder, ports, observer, stop = flight
-    logs = folder.path / "logs"
-    surroundings = environment(ports.domain, logs)
-    common = node_arguments.common_remappings(settings)
-    listener = None
-    with Processes(logs, surroundings) as children:
+    settings, folder, ports, observer, stop, publishers = flight
+    common, listener = node_arguments.common_remappings(settings), None
+    with Processes(folder.path / "logs", flight.surroundings) as children:
         children.hurry = lambda: stop.impatient
         try:
             start(children)
@@ -216,15 +238,13 @@ def run(
             if settings.fused:
                 observer.message(node_arguments.fused_line(settings))
             observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
-            namespace = settings.namespace
+            graph = flight.surroundings, ports.domain, settings.namespace, common
             with (
-                StatusListener(
-                    surroundings, ports.domain, namespace, common, publishers
-                ) as listener,
+                StatusListener(*graph, publishers) as listener,
                 course(children, listener) as running,
             ):
                 observer.started(ports.domain)
-                _watch(children, listener, observer, stop, running)
+                _watch(children, listener, flight, running)
         except NodeFailed as failure:
             return failure, listener
         finally:
@@ -235,24 +255,11 @@ def run(
     return None, listener
 
 
-def ros_arguments(settings: FlightSettings, folder: ResultFolder, publishers: str) -> list[str]:
-    """Return the ROS arguments that every node has; publishers: see `rightful`."""
-    # the nodes' output already contains their log messages; separate files would repeat them
-    arguments = ["--ros-args", "--disable-external-lib-logs", "-p", f"{PUBLISHERS}:={publishers}"]
-    return [
-        *arguments,
-        *("--params-file", str(folder.parameters), "-r", f"__ns:={settings.namespace}"),
-    ]
-
-
 def _watch(
-    children: Processes,
-    listener: StatusListener,
-    observer: Observer,
-    stop: StopRequest,
-    course: Course,
+    children: Processes, listener: StatusListener, flight: FlightRun, course: Course
 ) -> None:
     """Show the progress while the flight goes on. Raises NodeFailed."""
+    observer = flight.observer
     restarts = RestartTopic(listener.node)
     changed = ChangedParameters(listener.node, listener.door)
     while course.goes_on():
@@ -268,5 +275,5 @@ def _watch(
             observer.update(status)
         time.sleep(POLL)
     observer.finish()
-    if not stop.raised:
+    if not flight.stop.raised:
         children.check()

@@ -6,11 +6,9 @@ The flight goes on until the mission has ended. A first request to stop in the a
 command land; a second one ends the nodes at once, and the autopilot's own failsafe acts.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_control.supervision import State
@@ -19,13 +17,11 @@ from uam_lab.flights.flight_options import COCKPIT
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.operator import NoFlight, Operator
-from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import Processes
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import read_outcome
-from uam_lab.flights.ros.supervise import StatusListener
+from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Lab
@@ -53,20 +49,13 @@ CONTROLLED = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
 NONE_CONNECTED: dict[str, int] = {}  # of the plant, which a vehicle has not
 
 
-class VehicleCourse:
-    """A `Course`; a context manager."""
+class VehicleCourse(Course):
+    """The course of a vehicle's nodes: its devices, their connections, a landing by command."""
 
-    def __init__(
-        self,
-        lab: Lab,
-        listener: StatusListener,
-        guest: Callable[[str], Guest],
-        observer: Observer,
-        stop: StopRequest,
-    ) -> None:
-        """guest: returns a further node in the flight's ROS domain, by its name."""
-        self._lab, self._listener, self._guest = lab, listener, guest
-        self._observer, self._stop = observer, stop
+    def __init__(self, lab: Lab, flight: FlightRun, listener: StatusListener) -> None:
+        super().__init__()
+        self._lab, self._listener, self._guest = lab, listener, flight.guest
+        self._observer, self._stop = flight.observer, flight.stop
         node = listener.node
         self._diagnostics = listen(node, topics.DIAGNOSTICS)
         self._connections = Connections(node, spun=False)
@@ -76,12 +65,6 @@ class VehicleCourse:
         self._look_at = self._said_at = 0.0  # [s] time.monotonic()
         self._connected = self._landing = False
         self._done_at: float | None = None
-
-    def __enter__(self) -> VehicleCourse:
-        return self
-
-    def __exit__(self, *exception) -> None:
-        """Nothing is open."""
 
     def goes_on(self) -> bool:
         """Look at devices and nodes; return whether the flight goes on."""
@@ -140,7 +123,6 @@ class VehicleCourse:
             self._observer.message(f"waiting for {waiting[0]}{more}")
 
     def _land(self) -> None:
-        """Send the command land, once."""
         if self._landing:
             return
         self._landing = True
@@ -153,76 +135,63 @@ class VehicleCourse:
         self._observer.message(f"land: {answer}")
 
 
-class VehicleEngine:
-    """`fly` is an engine of `library.Flight`."""
+def fly(
+    lab: Lab,
+    settings: FlightSettings,
+    folder: ResultFolder,
+    observer: Observer,
+    stop: StopRequest,
+) -> Outcome:
+    """Start the nodes, record to `folder`; return when the mission or the user ends it.
 
-    def __init__(self, lab: Lab) -> None:
-        self._lab = lab
-
-    def fly(
-        self, settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
-    ) -> Outcome:
-        """Start the nodes, record to `folder`; return when the mission or the user ends it.
-
-        settings: see `settings_of`. Raises PortError, AddressError.
-        """
-        lab = self._lab
-        (folder.path / "logs").mkdir(exist_ok=True)
-        if lab.file.is_file():
-            shutil.copy(lab.file, folder.path / LAB_COPY)
-        with Reservation(
-            None, own_autopilot=False, domain=settings.domain, namespace=settings.namespace
-        ) as reservation:
-            supervise.prepare(vehicle_nodes.processes(lab).values(), observer)
-            ports = reservation.ports
-            sections = vehicle_nodes.parameters(lab, settings, folder)
-            node_arguments.write(sections, settings, folder)
-            page = sections[wiring.COCKPIT]
-            observer.message(f"cockpit: {page_address.address(page['host'], page['port'])}")
-            logs, publishers = folder.path / "logs", vehicle_nodes.publishers(lab)
-            common = node_arguments.common_remappings(settings)
-
-            def guest(name: str) -> Guest:
-                surroundings = environment(ports.domain, logs)
-                return Guest(name, surroundings, ports.domain, settings.namespace, common)
-
-            def course(_: Processes, listener: StatusListener) -> VehicleCourse:
-                return VehicleCourse(lab, listener, guest, observer, stop)
-
-            failure, _ = supervise.run(
-                supervise.FlightRun(settings, folder, ports, observer, stop),
-                publishers,
-                lambda children: start_nodes(children, lab, settings, folder, publishers),
-                lambda children: _announcement(children, ports),
-                course,
-            )
-        outcome = read_outcome(settings, folder, failure, stop.raised)
-        if outcome.series is None and failure is None and stop.raised:
-            outcome.failure = ""
-            outcome.notes.append(NOTHING_FLOWN)
-        return outcome
+    settings: see `settings_of`. Raises PortError, AddressError.
+    """
+    (folder.path / "logs").mkdir(exist_ok=True)
+    if lab.file.is_file():
+        shutil.copy(lab.file, folder.path / LAB_COPY)
+    with Reservation(
+        None, own_autopilot=False, domain=settings.domain, namespace=settings.namespace
+    ) as reservation:
+        supervise.prepare(vehicle_nodes.processes(lab).values(), observer)
+        sections = vehicle_nodes.parameters(lab, settings, folder)
+        node_arguments.write(sections, settings, folder)
+        page = sections[wiring.COCKPIT]
+        observer.message(f"cockpit: {page_address.address(page['host'], page['port'])}")
+        ports, publishers = reservation.ports, vehicle_nodes.publishers(lab)
+        flight = FlightRun(settings, folder, ports, observer, stop, publishers)
+        failure, _ = supervise.run(
+            flight,
+            lambda children: start_nodes(children, lab, flight),
+            lambda children: _announcement(children, ports),
+            lambda _, listener: VehicleCourse(lab, flight, listener),
+        )
+    outcome = read_outcome(settings, folder, failure, stop.raised)
+    if outcome.series is None and failure is None and stop.raised:
+        outcome.failure = ""
+        outcome.notes.append(NOTHING_FLOWN)
+    return outcome
 
 
 def start_nodes(
     children: Processes,
     lab: Lab,
-    settings: FlightSettings,
-    folder: ResultFolder,
-    publishers: str,
+    flight: FlightRun,
     without: Collection[str] = (),
     optional: Collection[str] = OPTIONAL,
 ) -> None:
-    """Start the nodes of a vehicle except `without`; their parameters are in `folder`.
+    """Start the nodes of a vehicle except `without`; their parameters are in the flight's folder.
 
     optional: the flight continues without these.
     """
-    arguments = supervise.ros_arguments(settings, folder, publishers)
     for name, module in vehicle_nodes.processes(lab).items():
         if name in without:
             continue
         again = supervise.RESTARTS if name in AGAIN else 0
-        nodes, missed = node_arguments.nodes_in(name, settings), name in optional
-        children.start(name, module, arguments, optional=missed, again=again, nodes=nodes)
+        how = {
+            "optional": name in optional,
+            "nodes": node_arguments.nodes_in(name, flight.settings),
+        }
+        children.start(name, module, flight.ros_arguments, again=again, **how)
 
 
 def _announcement(children: Processes, ports: Ports) -> Iterator[str]:

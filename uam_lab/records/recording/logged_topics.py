@@ -1,19 +1,17 @@
-"""The topics of a log as rows by stamp and as messages; latencies, losses, statistics."""
+"""The topics of a log as rows by stamp and as messages; latencies and losses."""
 
-from __future__ import annotations
-
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.stamps import SECOND
 from uam_lab.records.recording.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_lab.records.results.result_folder import known_json
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_switch
 from uam_msgs_py.messages.layouts import STAMP, BadMessage, Layout, Layouts
@@ -122,7 +120,7 @@ class Log:
         self._blocks: dict[Topic, list[Block]] = {}
 
     @classmethod
-    def read(cls, path: Path) -> Log:
+    def read(cls, path: Path) -> Self:
         """Read a log; its namespace is that of the states' topics.
 
         Raises UnreadableLog, also for a log of several vehicles; OSError.
@@ -231,17 +229,9 @@ def latencies(log: Log, period: float, ticks: np.ndarray | None = None) -> tuple
     return latency, len(np.setdiff1d(ticks, in_time))
 
 
-def statistics(file: Path) -> dict[str, Any]:
-    """Return what a node wrote at its end, {} without it."""
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-
-
 def losses(logs: Path) -> list[str]:
     """Return a note about the messages that the recorder lost, in a list; [] if it lost none."""
-    lost = statistics(logs / RECORDER).get("lost")
+    lost = known_json(logs / RECORDER).get("lost")
     if not lost:
         return []
     text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())

@@ -5,23 +5,17 @@ Errors are truth minus reference; on a vehicle, which has no truth, estimate min
 command to the touchdown command (`Series.flown`); every control tick weighs the same.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.grasp import Grasp
 from uam_lab.records.results import phase_errors
+from uam_lab.records.results.phase_errors import Figure, largest, of_hand, rms
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series
 
-# (key, columns of the error block, factor from SI to the unit that the key names)
-GROUPS = (
-    ("position_m", POSITION, 1.0),
-    ("attitude_deg", ATTITUDE, 180.0 / np.pi),
-    ("arm_deg", ARM, 180.0 / np.pi),
-)
 PASSED_ON = (
     "controller",
     "vehicle",
@@ -88,7 +82,7 @@ def compute(
     duration = _span(series.time[series.flown])
     wall = info.get("wall_s")
     simulated = _span(series.time)
-    phases = phase_errors.by_phase(series, GROUPS)
+    phases = phase_errors.by_phase(series)
     metrics = {key: info.get(key) for key in PASSED_ON}
     metrics |= {
         "duration_s": round(duration, 6),
@@ -105,12 +99,12 @@ def compute(
         "payload_place_error_m": payload.place_error_m,
         "load_steps": phase_errors.load_steps(series),
         "landing_error_m": landing,
-        "rms": errors(series, rms) | phase_errors.rms(series, series.flown),
-        "max": errors(series, largest) | phase_errors.largest(series, series.flown),
-        "position_3d_m": phase_errors.root_mean_square(phase_errors.distance(series, series.flown)),
+        "rms": errors(series, rms) | of_hand(series, series.flown, rms),
+        "max": errors(series, largest) | of_hand(series, series.flown, largest),
+        "position_3d_m": rms(phase_errors.distance(series, series.flown)),
         "phases": phases,
         "trajectory": next((p for p in phases if p["phase"] == phase_errors.TRAJECTORY), None),
-        "trajectory_with_ramps": phase_errors.with_ramps(series, GROUPS),
+        "trajectory_with_ramps": phase_errors.with_ramps(series),
         "faults": info.get("faults") or [],
     }
     if info.get("errors_of"):
@@ -127,26 +121,9 @@ def compute(
     return plain(metrics)
 
 
-def rms(errors: np.ndarray) -> np.ndarray:
-    """Return the root mean square (n,) over the rows of errors (ticks, n); NaN without rows."""
-    return np.sqrt(np.mean(np.square(errors), axis=0)) if len(errors) else _nothing(errors)
-
-
-def largest(errors: np.ndarray) -> np.ndarray:
-    """Return the largest magnitude (n,) over the rows of errors (ticks, n); NaN without rows."""
-    return np.max(np.abs(errors), axis=0) if len(errors) else _nothing(errors)
-
-
-def _nothing(errors: np.ndarray) -> np.ndarray:
-    return np.full(errors.shape[1], np.nan)
-
-
-def errors(
-    series: Series, figure: Callable[[np.ndarray], np.ndarray] = rms
-) -> dict[str, list[float]]:
+def errors(series: Series, figure: Figure = rms) -> dict[str, list[float]]:
     """Return `figure` of the tracking errors over the flight, by group, in the group's unit."""
-    error = series.block("error.")[series.flown]
-    return {key: (factor * figure(error[:, columns])).tolist() for key, columns, factor in GROUPS}
+    return phase_errors.by_group(series, series.flown, figure)
 
 
 def payload_facts(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import POSITION
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_lab.records.results.hand_columns import ERROR
 from uam_lab.records.results.timeseries import Series
 
@@ -19,29 +19,48 @@ WITH_RAMPS = ("run-up", TRAJECTORY, "run-out")
 BEFORE, AFTER = 4.0, 8.0  # [s] around a switch of the gripper, while the load changes
 
 Figure = Callable[[np.ndarray], Any]  # of errors (m,) or (m, n), over the ticks
+# (key, columns of the error block, factor from SI to the unit that the key names)
+GROUPS = (
+    ("position_m", POSITION, 1.0),
+    ("attitude_deg", ATTITUDE, 180.0 / np.pi),
+    ("arm_deg", ARM, 180.0 / np.pi),
+)
 
 
-def by_phase(series: Series, groups: tuple[tuple[str, slice, float], ...]) -> list[dict[str, Any]]:
+def rms(errors: np.ndarray) -> np.ndarray:
+    """Return the root mean square (n,) over the rows of errors (ticks, n); NaN without rows."""
+    return np.sqrt(np.mean(np.square(errors), axis=0)) if len(errors) else _nothing(errors)
+
+
+def largest(errors: np.ndarray) -> np.ndarray:
+    """Return the largest magnitude (n,) over the rows of errors (ticks, n); NaN without rows."""
+    return np.max(np.abs(errors), axis=0) if len(errors) else _nothing(errors)
+
+
+def _nothing(errors: np.ndarray) -> np.ndarray:
+    return np.full(errors.shape[1:], np.nan)[()]
+
+
+def by_group(series: Series, rows: np.ndarray, figure: Figure) -> dict[str, list[float]]:
+    """Return a figure of the tracking errors at the ticks `rows`, a mask, in the group's unit."""
+    error = series.block("error.")[rows]
+    return {key: (factor * figure(error[:, columns])).tolist() for key, columns, factor in GROUPS}
+
+
+def by_phase(series: Series) -> list[dict[str, Any]]:
     """Return the figures of every phase of the flight, in order of their begins.
 
-    groups: see `metrics.GROUPS`. A phase that returns, after a hold, is one entry; seconds: its
-    length in all.
+    A phase that returns, after a hold, is one entry; seconds: its length in all.
     """
     order = dict.fromkeys(name for name, _, _ in series.phase_spans())
     masks = {name: series.flown & series.in_phase(name) for name in order}
-    return [
-        {"phase": name} | figures(series, mask, groups)
-        for name, mask in masks.items()
-        if mask.any()
-    ]
+    return [{"phase": name} | figures(series, mask) for name, mask in masks.items() if mask.any()]
 
 
-def with_ramps(
-    series: Series, groups: tuple[tuple[str, slice, float], ...]
-) -> dict[str, Any] | None:
+def with_ramps(series: Series) -> dict[str, Any] | None:
     """Return the figures of the trajectory and its ramps, None without a trajectory."""
     rows = with_ramps_rows(series)
-    return figures(series, rows, groups) if rows.any() else None
+    return figures(series, rows) if rows.any() else None
 
 
 def with_ramps_rows(series: Series) -> np.ndarray:
@@ -56,22 +75,13 @@ def distance(series: Series, rows: np.ndarray) -> np.ndarray:
     return np.linalg.norm(series.block("error.")[rows][:, POSITION], axis=1)
 
 
-def root_mean_square(values: np.ndarray) -> float:
-    """Return the root mean square of values (m,); NaN without any."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
-
-
-def figures(
-    series: Series, rows: np.ndarray, groups: tuple[tuple[str, slice, float], ...]
-) -> dict[str, Any]:
+def figures(series: Series, rows: np.ndarray) -> dict[str, Any]:
     """Return the figures of the ticks `rows` (ticks,), a mask with one tick or more.
 
     position_3d_m: root mean square of the distance to the reference; largest_3d_m: largest
-    distance; tilt_deg, thrust_n: largest true tilt, and largest sum of the rotors' thrusts; in rms
-    and max: see `rms` and `largest`.
+    distance; tilt_deg, thrust_n: largest true tilt, and largest sum of the rotors' thrusts.
     """
-    error, times = series.block("error.")[rows], series.time[rows]
-    away = distance(series, rows)
+    away, times = distance(series, rows), series.time[rows]
     thrust = sum(
         series[name][rows]
         for name in series.columns.names
@@ -81,31 +91,17 @@ def figures(
     return {
         "from_s": round(float(times[0]), 6),
         "seconds": round(period * len(times), 6),
-        "position_3d_m": root_mean_square(away),
+        "position_3d_m": rms(away),
         "largest_3d_m": float(away.max()),
-        "rms": {
-            key: (factor * np.sqrt(np.mean(error[:, columns] ** 2, axis=0))).tolist()
-            for key, columns, factor in groups
-        }
-        | rms(series, rows),
-        "max": largest(series, rows),
+        "rms": by_group(series, rows, rms) | of_hand(series, rows, rms),
+        "max": of_hand(series, rows, largest),
         "tilt_deg": float(np.degrees(series.tilt[rows].max())),
         "thrust_n": float(np.max(thrust)),
     }
 
 
-def rms(series: Series, rows: np.ndarray) -> dict[str, Any]:
-    """Return the root mean squares at the ticks `rows`, a mask; {} without an end effector."""
-    return _figures(series, rows, lambda errors: np.sqrt(np.mean(np.square(errors), axis=0)))
-
-
-def largest(series: Series, rows: np.ndarray) -> dict[str, Any]:
-    """Return the largest magnitudes at the ticks `rows`, a mask; {} without an end effector."""
-    return _figures(series, rows, lambda errors: np.max(np.abs(errors), axis=0))
-
-
 def load_steps(series: Series) -> dict[str, Any] | None:
-    """Return the `largest` errors around the last lift of a payload, and around its set-down; None
+    """Return the largest errors around the last lift of a payload, and around its set-down; None
     without a grip."""
     spans = series.magnet_spans()
     if not spans:
@@ -114,16 +110,16 @@ def load_steps(series: Series) -> dict[str, Any] | None:
     around = {
         name: (series.time - at >= -BEFORE) & (series.time - at <= AFTER) for name, at in switched
     }
-    return {name: largest(series, series.flown & rows) for name, rows in around.items()}
+    return {name: of_hand(series, series.flown & rows, largest) for name, rows in around.items()}
 
 
-def _figures(series: Series, rows: np.ndarray, figure: Figure) -> dict[str, Any]:
+def of_hand(series: Series, rows: np.ndarray, figure: Figure) -> dict[str, Any]:
+    """Return a figure of the end effector's errors at the ticks `rows`, a mask; {} without one."""
     if f"{ERROR}.x" not in series.columns or not rows.any():
         return {}
     place = series.block(f"{ERROR}.")[rows][:, POSITION]
     heading = np.degrees(series[f"{ERROR}.heading"][rows])
-    away = np.linalg.norm(series.block("error.")[rows][:, POSITION], axis=1)
-    epsilon = float(figure(away))
+    epsilon = float(figure(distance(series, rows)))
     return {
         "end_effector_m": figure(place).tolist(),
         "end_effector_norm_m": float(figure(np.linalg.norm(place, axis=1))),

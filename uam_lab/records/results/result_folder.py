@@ -175,6 +175,14 @@ def read_json(file: Path) -> dict[str, Any]:
     return found
 
 
+def known_json(file: Path) -> dict[str, Any]:
+    """Return the content of a JSON file that a program left; {} if it is missing or broken."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
 def as_json(value: Any) -> str:
     """Return indented JSON with a final newline; types as in `metrics.plain`, paths as text."""
     return json.dumps(plain(value), indent=2, allow_nan=False, default=str) + "\n"

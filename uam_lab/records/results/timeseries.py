@@ -10,14 +10,12 @@ an engine fills a preallocated float64 array by column number:
 In the file a column is called "name [unit]"; in the code it is called by its name alone.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pyarrow as pa
@@ -150,7 +148,7 @@ class FlightTable:
     """Preallocated table for recording a flight; unwritten entries are NaN."""
 
     @classmethod
-    def of(cls, capacity: int, vehicle: VehicleDescription) -> FlightTable:
+    def of(cls, capacity: int, vehicle: VehicleDescription) -> Self:
         """Return a table for a vehicle, with its end effector if it has one."""
         return cls(capacity, columns_of(vehicle), Flyer.with_hand(vehicle))
 
@@ -165,11 +163,6 @@ class FlightTable:
 
     def next_row(self, phase: str) -> np.ndarray:
         """Return the row (columns,) of the next tick, to fill in place; a full table grows."""
-        number = self.next_number(phase)  # may replace `values`
-        return self.values[number]
-
-    def next_number(self, phase: str) -> int:
-        """Return the number of the next tick's row in `values`; a full table grows."""
         number = self.count
         if number == len(self.values):
             self.values = np.concatenate([self.values, np.full_like(self.values, np.nan)])
@@ -178,9 +171,9 @@ class FlightTable:
             self.phase_names[phase] = len(self.phase_names)
         self.phases[number] = self.phase_names[phase]
         self.count = number + 1
-        return number
+        return self.values[number]
 
-    def series(self, info: Mapping[str, Any] | None = None) -> Series:
+    def series(self, info: Mapping[str, Any] | None = None) -> Self:
         """Return the recorded rows, with error columns, end effector and countdown computed."""
         values, columns = self.values[: self.count], self.columns
         count_down(values[:, columns["time"]])
@@ -300,7 +293,7 @@ class Series:
             pq.write_table(self.table(), temporary, compression="zstd")
 
 
-def read(path: Path) -> Series:
+def read(path: Path) -> Self:
     """Read a flight from a file.
 
     Raises UnreadableFlight if it is no parquet file or if required columns are missing.
