@@ -136,7 +136,6 @@ def _parameters(options: argparse.Namespace) -> MocapParameters:
 
 
 def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
-    """Guide through the two places and measure at each."""
     from uam_sim_bridge.devices.mocap import measurement
 
     parameters = _parameters(options)
@@ -164,7 +163,6 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
 
 
 def _confirm(step: str) -> None:
-    """Wait until the person confirms a step."""
     from uam_sim_bridge.devices.mocap.frame import MocapError
 
     try:
@@ -174,7 +172,6 @@ def _confirm(step: str) -> None:
 
 
 def _say(made: Calibration, options: argparse.Namespace) -> None:
-    """Print the residuals and what to do next."""
     m = made.measured
     say(
         f"moved {m['distance_m']:.2f} m; between the places: {m['height_difference_m']:+.4f} m "

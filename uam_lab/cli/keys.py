@@ -27,7 +27,6 @@ class Keys:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Restore the terminal."""
         if self._before is not None:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 

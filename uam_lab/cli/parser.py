@@ -124,7 +124,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _full(error: OSError) -> str:
-    """Return the text about a disk without room."""
     text = (error.strerror or str(error)).lower()
     if error.filename is None:
         return text

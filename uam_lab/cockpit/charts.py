@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,33 +28,33 @@ SMALLEST = 1e-9  # shown in place of zero on a logarithmic axis
 HEIGHT = 150  # [px]
 
 
-@dataclass(frozen=True)
-class Chart:
-    """title: with unit; names: of the series; logarithmic: scale of the y axis."""
-
-    title: str
-    names: tuple[str, ...]
-    logarithmic: bool = False
-
-
 class StripChart:
     """One chart of the page: `add` stores samples, `draw` sends them to the page."""
 
-    def __init__(self, gui: viser.GuiApi, chart: Chart, window: float, interval: float):
-        """window: shown time [s]; interval: minimum time between two stored samples [s]."""
-        self._chart, self._window, self._interval = chart, window, interval
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        title: str,
+        names: Sequence[str],
+        times: tuple[float, float],
+        logarithmic: bool = False,
+    ):
+        """title: with unit; names: of the series; times: shown time [s], minimum time between two
+        stored samples [s]; logarithmic: scale of the y axis."""
+        self._count, self._logarithmic = len(names), logarithmic
+        self._window, self._interval = times
         self._rows: deque[tuple[float, ...]] = deque()
         series = [uplot.Series(label="t [s]")]
         series += [
             uplot.Series(label=name, stroke=colour, width=1.5, points={"show": False})
-            for name, colour in zip(chart.names, COLOURS, strict=False)
+            for name, colour in zip(names, COLOURS, strict=False)
         ]
-        scales = {"x": {"time": False}, "y": {"distr": 3 if chart.logarithmic else 1}}
+        scales = {"x": {"time": False}, "y": {"distr": 3 if logarithmic else 1}}
         axes = ({"size": 34}, {"size": 58})
         self._handle = gui.add_uplot(
             tuple(np.zeros(1) + SMALLEST for _ in series),
             tuple(series),
-            title=chart.title,
+            title=title,
             scales=scales,
             axes=axes,
             height=HEIGHT,
@@ -65,7 +64,7 @@ class StripChart:
     def add(self, time: float, values: Sequence[float]) -> None:
         """Store a sample (n,) at time [s]; ignore it if its length is wrong or it is not finite."""
         rows = self._rows
-        if len(values) != len(self._chart.names) or not np.all(np.isfinite(values)):
+        if len(values) != self._count or not np.all(np.isfinite(values)):
             return
         if rows and time < rows[-1][0]:  # another flight has begun
             rows.clear()
@@ -82,7 +81,7 @@ class StripChart:
             return
         self._new = False
         columns = np.array(self._rows).T
-        if self._chart.logarithmic:
+        if self._logarithmic:
             columns[1:] = np.maximum(columns[1:], SMALLEST)
         self._handle.data = tuple(np.ascontiguousarray(column) for column in columns)
 
@@ -101,7 +100,7 @@ class Charts:
     ):
         """window: shown time [s]; interval: between samples [s]; joints: their names; hand: whether
         there is an end effector."""
-        self._gui, self._window, self._interval = gui, window, interval
+        self._gui, self._times = gui, (window, interval)
         self._joints = len(joints)
         self._charts: list[StripChart] = []
         self._adaptation: dict[Topic, StripChart] = {}
@@ -119,8 +118,7 @@ class Charts:
         self._adaptation_tab = panel.add_tab("Adaptation", viser.Icon.ADJUSTMENTS)
 
     def _chart(self, title: str, names: Sequence[str], logarithmic: bool = False) -> StripChart:
-        chart = Chart(title, tuple(names), logarithmic)
-        self._charts.append(StripChart(self._gui, chart, self._window, self._interval))
+        self._charts.append(StripChart(self._gui, title, names, self._times, logarithmic))
         return self._charts[-1]
 
     def show(self, topic: Topic, message: Any) -> None:

@@ -48,7 +48,7 @@ class FrameRate:
         used share of all processor time since the last call, 0..1.
         """
         self._fastest, self._slowest, self._clock = fastest, slowest, clock
-        self._own = own or _process_time
+        self._own = own or (lambda: sum(psutil.Process().cpu_times()[:2]))  # of user and system
         self._machine = machine or (lambda: psutil.cpu_percent() / 100.0)
         self._machine()
         self._last = clock(), self._own()
@@ -77,11 +77,6 @@ class FrameRate:
             self.sparing = True
         elif self._rested >= REST:
             self.sparing = False
-
-
-def _process_time() -> float:
-    times = psutil.Process().cpu_times()
-    return times.user + times.system
 
 
 @dataclass(frozen=True)

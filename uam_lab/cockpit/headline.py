@@ -88,7 +88,6 @@ def _facts(health: Health, limits: Mapping[str, list[float]]) -> Iterator[Row]:
 
 
 def _control(autopilot: AutopilotState) -> tuple[str, str]:
-    """Return level and text: who has control."""
     if autopilot.released_to:
         return BAD, f"{autopilot.released_to}, has control"
     return GOOD, "companion" if autopilot.armed else "nobody: disarmed"

@@ -239,7 +239,6 @@ class Page:
         self._health.set_mission(mission)
 
     def _changed(self, change: ParameterChange) -> None:
-        """Show an accepted change of parameters, of any client."""
         if not change.accepted:
             return
         new = {name: values[1] for name, values in change.values.items()}

@@ -166,7 +166,9 @@ def _answer(
 ) -> Response | None:
     """Answer a request; None for a websocket, whose origin the library checks."""
     host = request.headers.get("Host", "")
-    if not any(_is(one, f"http://{host}") for one in allowed):  # a foreign name of this address
+    own = f"http://{host}"
+    fits = (one == own if isinstance(one, str) else one.fullmatch(own) for one in allowed)
+    if not any(fits):  # a foreign name of this address
         return _response(connection, 403, "text/plain", b"not the name of this page\n", host)
     if request.headers.get("Upgrade") == "websocket":
         return None
@@ -184,10 +186,6 @@ def _answer(
         body = body.replace(b"<script ", begin + b'<script nonce="@NONCE@" ', 1)
         body = body.replace(b"</body>", end + b"</body>")
     return _response(connection, page.status_code, kind, body, host, " 'unsafe-eval'")
-
-
-def _is(allowed: Origin, origin: str) -> bool:
-    return allowed == origin if isinstance(allowed, str) else bool(allowed.fullmatch(origin))
 
 
 def _response(

@@ -108,7 +108,6 @@ class MjcfText:
         }
 
     def _body(self, body: XmlElement, link: int) -> None:
-        """Add inertia and shapes of a link."""
         mass, centre, tensor = geometry.inertial(self.parts, link)
         six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
         given = {"pos": text(centre), "mass": f"{mass:.9g}", "fullinertia": text(six)}
@@ -141,7 +140,6 @@ class MjcfText:
         return own.T @ (place - origin), own.T @ axes
 
     def _shown(self, body: XmlElement, link: int, geom: int) -> None:
-        """Add a shape that is seen only."""
         model = self.parts.model
         place, axes = self._in(link, *geometry.pose_of(self.parts, geom))
         look = {"pos": text(place), "quat": text(quaternion(axes)), "mass": "0"}

@@ -78,7 +78,6 @@ def _layout(parts: Parts, answers: Answers) -> list[Tree]:
 
 
 def _radius(parts: Parts, answers: Answers) -> Told:
-    """Return the radius [m] of the propellers."""
     gap = rotors.neighbours(np.array([one.position for one in parts.rotors]))
     shown = max(one.radius for one in parts.rotors)
     if 0.0 < shown < WIDEST * gap:
@@ -215,7 +214,6 @@ def _servo(parts: Parts, answers: Answers, kind: Told, need: float) -> Tree:
 
 
 def _told(values: dict[str, Any], origin: str, reason: str = "") -> Tree:
-    """Return numbers of one origin."""
     return {
         key: _told(value, origin, reason)
         if isinstance(value, dict)

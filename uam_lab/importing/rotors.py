@@ -113,7 +113,6 @@ def find_rotors(
 
 
 def _names(model: mujoco.MjModel, body: int) -> list[str]:
-    """Return the names of a body and of its joints."""
     first, count = model.body_jntadr[body], model.body_jntnum[body]
     return [model.body(body).name, *(model.joint(first + i).name for i in range(count))]
 

@@ -113,15 +113,11 @@ def tree(file: Path) -> XmlElement:
 def kind_of(file: Path, root: XmlElement) -> str:
     """Return "robot" for a URDF, "mujoco" for an MJCF; raise ImportRefused for another file."""
     name = etree.QName(root).localname
-    if "xacro" in "".join(root.nsmap.values()) and _has_xacro(root):
+    tags = (one.tag for one in root.iter() if isinstance(one.tag, str))
+    if "xacro" in "".join(root.nsmap.values()) and any("xacro" in tag for tag in tags):
         plain = file.name.split(".")[0] + ("_plain" if file.suffix == ".urdf" else "")
         raise ImportRefused(f"{file}: xacro macros; xacro {file.name} > {plain}.urdf first")
     if name in ("robot", "mujoco"):
         return name
     other = "; for it: the file that has it" if name == "mujocoinclude" else ""
     raise ImportRefused(f"{file} line {root.sourceline}: <{name}>: URDF or MJCF expected{other}")
-
-
-def _has_xacro(root: XmlElement) -> bool:
-    tags = (one.tag for one in root.iter() if isinstance(one.tag, str))
-    return any("xacro" in tag for tag in tags)

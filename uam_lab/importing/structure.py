@@ -113,7 +113,8 @@ def _base(source: Source, model: mujoco.MjModel, given: str) -> int:
         if given not in names:
             raise ImportRefused(f"{source.file}: no body '{given}' at the top; {_listed(names)}")
         return _with_mass(source, model, names[given])
-    free = [b for b in tops if _moves_freely(model, b)]
+    alone = [b for b in tops if model.body_jntnum[b] == 1]
+    free = [b for b in alone if model.jnt_type[model.body_jntadr[b]] == FREE]
     rest = free or [b for b in tops if model.body_subtreemass[b] > 0.0]
     jointed = [b for b in rest if _has_hinge(model, b)]
     rest = jointed if len(rest) > 1 and jointed else rest
@@ -131,11 +132,6 @@ def _with_mass(source: Source, model: mujoco.MjModel, base: int) -> int:
     if model.body_subtreemass[base] <= 0.0:
         raise source.error("body", model.body(base).name, "the base has no mass")
     return base
-
-
-def _moves_freely(model: mujoco.MjModel, body: int) -> bool:
-    first = model.body_jntadr[body]
-    return model.body_jntnum[body] == 1 and model.jnt_type[first] == FREE
 
 
 def _has_hinge(model: mujoco.MjModel, top: int) -> bool:

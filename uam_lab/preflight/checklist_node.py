@@ -249,7 +249,6 @@ class ChecklistNode:
             self._diagnostics.publish(diagnostic(stamp, label(self._node), level, summary, values))
 
     def _record(self) -> None:
-        """Write the record when something has been added."""
         file, count = self._options.record, len(self._checklist.entries)
         if not file or count == self._recorded:
             return

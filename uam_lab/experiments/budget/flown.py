@@ -44,7 +44,7 @@ class CoreShares(Observer):
         self._begun: dict[str, tuple[float, float]] = {}  # name → wall time, processor time [s]
         self._newest: dict[str, tuple[float, float]] = {}
         self.message, self.started = observer.message, observer.started
-        self.bring_up = observer.bring_up
+        self.bring_up, self.finish = observer.bring_up, observer.finish
 
     def update(self, status: FlightStatus) -> None:
         """Sample in flight."""
@@ -52,10 +52,6 @@ class CoreShares(Observer):
             self._newest = spent()
             self._begun = self._begun or self._newest
         self._observer.update(status)
-
-    def finish(self) -> None:
-        """Pass it on."""
-        self._observer.finish()
 
     @property
     def shares(self) -> dict[str, float]:

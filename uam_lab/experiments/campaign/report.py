@@ -48,7 +48,6 @@ class Flown:
         self.failed = np.array([not one.completed for one in flights])
 
     def __len__(self) -> int:
-        """Return the number of flights."""
         return len(self.numbers)
 
     @cached_property

@@ -68,7 +68,6 @@ class Draws(Sequence[Trial]):
             )
 
     def __len__(self) -> int:
-        """Return the number of flights."""
         return self.total
 
     def __getitem__(self, number: int) -> Trial:

@@ -1,11 +1,10 @@
 """What a design begins with: inertias over the poses of the arm, torques, lags and noise."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -58,7 +57,7 @@ class Facts:
     servo: np.ndarray
 
     @classmethod
-    def of(cls, vehicle: Vehicle) -> Facts:
+    def of(cls, vehicle: Vehicle) -> Self:
         """Return the facts of a vehicle; raises VehicleError if its MJCF contradicts it."""
         described, period = vehicle.description, vehicle.description.control_period
         sensors, servos = vehicle.numbers["sensors"], vehicle.numbers["servos"]

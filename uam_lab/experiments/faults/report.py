@@ -222,7 +222,6 @@ Cells = dict[tuple[str, str], Group]
 
 
 def _flown(matrix: Matrix, results: Sequence[FaultResult]) -> list[str]:
-    """Return the rows with flights."""
     flown = {result.fault for result in results}
     return [row for row in matrix.rows if row in flown]
 

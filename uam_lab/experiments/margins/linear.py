@@ -7,12 +7,10 @@ Margins: the open loop L is that of negative feedback: the closed loop is stable
 Crossings are interpolated between the frequencies.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -46,7 +44,7 @@ class LinearBlock:
             parts.append(self.c @ solved + self.d)
         return np.concatenate(parts)
 
-    def only(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearBlock:
+    def only(self, inputs: Sequence[str], outputs: Sequence[str]) -> Self:
         """Return the block with these inputs and outputs, in this order."""
         m = [self.inputs.index(name) for name in inputs]
         p = [self.outputs.index(name) for name in outputs]
@@ -61,7 +59,7 @@ class LinearBlock:
             state = self.a @ state + self.b @ u
         return found
 
-    def reduced(self) -> LinearBlock:
+    def reduced(self) -> Self:
         """Return the block without states that influence neither an output nor another state."""
         block = self
         while True:
@@ -72,7 +70,7 @@ class LinearBlock:
             block = LinearBlock(a, b, c, block.d, block.inputs, block.outputs)
 
 
-def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> LinearBlock:
+def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> Self:
     """Return the block that delays each of `inputs` by `ticks` and names it as in `outputs`."""
     width, size = len(inputs), ticks * len(inputs)
     a, b = np.eye(size, k=-width), np.eye(size, width)
@@ -80,7 +78,7 @@ def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> LinearBl
     return LinearBlock(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
 
 
-def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> LinearBlock:
+def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> Self:
     """Connect each input with the output of the same name; return the whole as a block.
 
     added: signals to which the input IN + name is added. Inputs that no block drives stay inputs.
@@ -121,7 +119,7 @@ def linearise(
     inputs: Sequence[str],
     outputs: Sequence[str],
     at: np.ndarray | None = None,
-) -> LinearBlock:
+) -> Self:
     """Return the block of `step`: inputs (m,) → outputs (p,), by central differences.
 
     objects: what keeps the state between two steps; every float array that can be reached from them

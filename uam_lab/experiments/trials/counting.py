@@ -1,6 +1,6 @@
 """Progress of a long computation: a bar on a terminal, otherwise a few lines."""
 
-from __future__ import annotations
+from typing import Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -27,7 +27,7 @@ class Counting:
         )
         self._line = self._bar.add_task(what, total=total, text="")
 
-    def __enter__(self) -> Counting:
+    def __enter__(self) -> Self:
         self._bar.__enter__()
         return self
 

@@ -6,15 +6,13 @@ written every few seconds to a small file of their own in the folder beside the 
 that is killed loses the rows of the last seconds and nothing else.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -114,7 +112,7 @@ class RowTable:
             self.compact()
         self.keys = set(self._read([self.key])[self.key].to_pylist())
 
-    def __enter__(self) -> RowTable:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:

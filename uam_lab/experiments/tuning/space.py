@@ -1,13 +1,11 @@
 """Search space from a file of config/tuning: parameters with ranges, flights, cost function."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import NODES, Profile, default_profile, profile_of
@@ -119,7 +117,7 @@ class Space:
             section[knob.parameter] = vector
         return profile_of(sections, Path(f"{name}.yaml"), self.start.vehicle)
 
-    def with_effects(self, effects: Effects) -> Space:
+    def with_effects(self, effects: Effects) -> Self:
         """Return the space with these effects of the plant in every flight that has none."""
         flights = ({**flight, "effects": flight["effects"] or effects} for flight in self.flights)
         return replace(self, flights=tuple(flights))
@@ -141,7 +139,7 @@ class Space:
 
 def load_space(
     name_or_file: str, start: Profile | None = None, vehicle: VehicleDescription | None = None
-) -> Space:
+) -> Self:
     """Read a file of config/tuning, or another one.
 
     start: None for the vehicle's profile of the file's law; vehicle: None for the default one.

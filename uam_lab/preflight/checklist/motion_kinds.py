@@ -1,9 +1,8 @@
 """What is measured in a motion by hand, and by which sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -29,7 +28,7 @@ class Pose:
     commanded: np.ndarray
 
     @classmethod
-    def of(cls, samples: Sequence[Sample]) -> Pose:
+    def of(cls, samples: Sequence[Sample]) -> Self:
         """Return the means of at least one sample; attitudes: of the middle sample."""
         middle = samples[len(samples) // 2]
 

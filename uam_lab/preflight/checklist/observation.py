@@ -1,13 +1,11 @@
 """What the checklist looks at: an observation of automatic items, samples of guided ones."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -217,7 +215,7 @@ class Resting:
     spread: float
 
     @classmethod
-    def of(cls, samples: Sequence[Sample]) -> Resting:
+    def of(cls, samples: Sequence[Sample]) -> Self:
         """Return the means of at least one sample."""
         vertical = np.mean([up(one.attitude) for one in samples], axis=0)
         force = np.mean([one.force for one in samples], axis=0)

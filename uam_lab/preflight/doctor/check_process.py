@@ -1,7 +1,5 @@
 """Runs a part of a check in a separate process, with a time limit."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -9,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 TOO_LATE = "no end within"
 
@@ -65,7 +63,7 @@ class CheckProcess:
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
 
-    def __enter__(self) -> CheckProcess:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:

@@ -16,13 +16,7 @@ from typing import Any
 
 import yaml
 from rclpy.duration import Duration
-from rclpy.qos import (
-    QoSDurabilityPolicy,
-    QoSHistoryPolicy,
-    QoSLivelinessPolicy,
-    QoSProfile,
-    QoSReliabilityPolicy,
-)
+from rclpy.qos import QoSLivelinessPolicy, QoSProfile
 
 from uam_control.stamps import SECOND
 from uam_lab.records.recording.bounded_log import BoundedLog
@@ -33,20 +27,7 @@ METADATA = "metadata.yaml"
 VERSION = 9  # of the bag's metadata: policies of the QoS by name, QoS profiles as a list
 ROS_DISTRO = "jazzy"
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # RMW_DURATION_INFINITE: no deadline, no end
-HISTORY = {QoSHistoryPolicy.KEEP_LAST: "keep_last", QoSHistoryPolicy.KEEP_ALL: "keep_all"}
-RELIABILITY = {
-    QoSReliabilityPolicy.RELIABLE: "reliable",
-    QoSReliabilityPolicy.BEST_EFFORT: "best_effort",
-}
-DURABILITY = {
-    QoSDurabilityPolicy.TRANSIENT_LOCAL: "transient_local",
-    QoSDurabilityPolicy.VOLATILE: "volatile",
-}
-LIVELINESS = {
-    QoSLivelinessPolicy.SYSTEM_DEFAULT: "automatic",  # the default of DDS
-    QoSLivelinessPolicy.AUTOMATIC: "automatic",
-    QoSLivelinessPolicy.MANUAL_BY_TOPIC: "manual_by_topic",
-}
+AUTOMATIC = QoSLivelinessPolicy.AUTOMATIC  # the default of DDS
 SEPARATOR = "=" * 80
 # Field line: type, optional bound and array, name. Constants and comments never name a type.
 FIELD = re.compile(r"^\s*([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(?:<=)?\d*\])?\s+[A-Za-z]\w*")
@@ -199,14 +180,15 @@ def _counted(topic: BagTopic, counts: Mapping[str, int]) -> dict[str, Any]:
 
 def offered_qos(qos: QoSProfile) -> dict[str, Any]:
     """Return all policies of a QoS profile as rosbag2 names them."""
+    usual = qos.liveliness == QoSLivelinessPolicy.SYSTEM_DEFAULT
     return {
-        "history": HISTORY[qos.history],
+        "history": qos.history.short_key,
         "depth": qos.depth,
-        "reliability": RELIABILITY[qos.reliability],
-        "durability": DURABILITY[qos.durability],
+        "reliability": qos.reliability.short_key,
+        "durability": qos.durability.short_key,
         "deadline": _time(qos.deadline),
         "lifespan": _time(qos.lifespan),
-        "liveliness": LIVELINESS[qos.liveliness],
+        "liveliness": (AUTOMATIC if usual else qos.liveliness).short_key,
         "liveliness_lease_duration": _time(qos.liveliness_lease_duration),
         "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
     }

@@ -118,9 +118,6 @@ def text(value: Any) -> str:
     return str(value)
 
 
-__all__ = ["ParameterRow", "ParameterTable", "ProfileError", "compare", "text"]
-
-
 @dataclass(frozen=True)
 class ChangeRow:
     """One request: its number in the figures, mission time [s], and its result."""

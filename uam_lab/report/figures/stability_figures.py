@@ -117,7 +117,6 @@ def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _only(flights: Sequence[DrawnFlight]):
-    """Return the analysis of the flight if there is exactly one flight."""
     return flights[0].stability if len(flights) == 1 else None
 
 

@@ -5,29 +5,21 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
+from uam_control.profiles.profile import ProfileError
 from uam_lab.records.results import templates
 from uam_lab.records.results.atomic import write_text
-from uam_lab.records.results.metrics import errors
+from uam_lab.records.results.metrics import PASSED_ON, errors
 from uam_lab.records.results.result_folder import PX4_LOG, read_json
 from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows
-from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.figures.zoomable import library
 from uam_lab.report.video.flight_video import Rendered, existing
 
-FACTS = (
-    ("controller", "controller"),
-    ("profile", "profile"),
-    ("scenario", "scenario"),
-    ("engine", "engine"),
-    ("layout", "layout"),
-    ("clock", "clock"),
-    ("autopilot", "autopilot"),
-    ("seed", "seed"),
-    ("payload_mass_kg", "payload mass [kg]"),
-)
+# the conditions that the page shows, of metrics.json: name → label
+FACTS = {name: name for name in PASSED_ON if name != "vehicle"}
+FACTS |= {"payload_mass_kg": "payload mass [kg]"}
 
 FILES = (
     ("log.mcap", "the log of all topics, a bag of ROS 2"),
@@ -55,8 +47,8 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     rendered = rendered or existing(directory)
     shots = rendered.snapshots
     try:
-        comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
-    except parameters.ProfileError as error:
+        comparison, no_parameters = parameter_table.compare(directory / "parameters.yaml"), ""
+    except ProfileError as error:
         comparison, no_parameters = None, str(error)
     text = templates.render(
         "uam_lab.report.page",
@@ -75,7 +67,9 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
         changes=parameter_table.rows(info),
         faults=fault_marks.rows(info),
-        facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
+        facts=[
+            (label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS.items()
+        ],
         controller=controller,
         strip=_embedded(rendered.strip),
         video=_embedded(rendered.video),
@@ -106,7 +100,6 @@ def _stability(file: Path) -> dict[str, Any] | None:
 
 
 def _embedded(file: Path | None) -> str | None:
-    """Return the file as a data URI, None without a file."""
     return None if file is None else templates.embedded(file)
 
 

@@ -7,8 +7,6 @@ its OpenGL at import, and a broken driver may crash the process. The child write
 standard output, one line per step; a pipe holds all of them.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess
@@ -16,6 +14,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -65,7 +64,6 @@ class Rendering:
         self._further = platforms[1:]
 
     def _start(self, platform: str) -> subprocess.Popen[str]:
-        """Run this module as a process."""
         command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(self._directory)]
         return subprocess.Popen(
             command if self._video else [*command, "--no-video"],
@@ -102,7 +100,7 @@ class Rendering:
                 last_line = line.strip()
         return self._child.wait(), last_line
 
-    def __enter__(self) -> Rendering:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception) -> None:
