@@ -49,6 +49,7 @@ def mermaid(transitions, first, last, group):
     """Return transitions as a mermaid state diagram, one arrow per pair of states; what leads out
     of each state of `group` to one target leads out of the group."""
     named = {state: state.value.replace(" ", "_") for state in type(first)}
+    transitions = sorted(transitions, key=lambda it: list(named).index(it[0]))
     shared = [
         (event, target)
         for source, event, target in transitions
