@@ -43,6 +43,7 @@ def test_a_law_of_the_whole_body_is_one_stage():
     np.testing.assert_array_equal(signals.attitude_reference, desired)
 
 
+@pytest.mark.long  # two large functions are compiled for it
 def test_the_compiled_step_of_the_whole_body_does_what_the_stage_does():
     outputs = []
     for compiled in (False, True):
