@@ -40,9 +40,8 @@ class Teleop:
         self._mapping, self.sent = mapping, 0
         tool = frame(node, topics.TOOL)
         self._frame = tool if mapping.frame == topics.TOOL else topics.WORLD
-        twist, gripper = topics.END_EFFECTOR_TWIST, topics.GRIPPER_COMMAND
-        self._twist = node.create_publisher(twist.type, twist.name, twist.qos)
-        self._gripper = node.create_publisher(gripper.type, gripper.name, gripper.qos)
+        self._twist = topics.END_EFFECTOR_TWIST.outlet(node)
+        self._gripper = topics.GRIPPER_COMMAND.outlet(node)
         self._hold = node.create_client(Trigger, HOLD)
         self._limits = node.create_client(GetParameters, f"{MISSION}/get_parameters")
         self._jog: tuple[float, float] | None = None  # [m/s], [rad/s] LIMITS

@@ -46,8 +46,7 @@ class Services:
     def offer(self, topic: Topic) -> Any:
         """Return the publisher of a topic; create it if necessary."""
         if topic.name not in self._publishers:
-            made = self._node.create_publisher(topic.type, topic.name, topic.qos)
-            self._publishers[topic.name] = made
+            self._publishers[topic.name] = topic.outlet(self._node)
         return self._publishers[topic.name]
 
     def ready(self, kind: type, name: str) -> bool:

@@ -108,7 +108,7 @@ class Operator:
             kinds = ", ".join(one.type.__name__ for one in planners)
             raise TypeError(f"{type(message).__name__} is no plan: {kinds} expected")
         before, sent = self.mission().answers, -math.inf
-        publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
+        publisher = topic.outlet(self._node)
 
         def answered() -> bool:
             """Send again while the mission's end of the connection is perhaps not there yet."""

@@ -112,12 +112,8 @@ class ChecklistNode:
             watcher, rightful_nodes(node), vehicle, observation, host, lambda: limits.current
         )
         self._services = Services(node)
-        self._publisher = node.create_publisher(
-            topics.CHECKLIST.type, topics.CHECKLIST.name, topics.CHECKLIST.qos
-        )
-        self._diagnostics = node.create_publisher(
-            topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
-        )
+        self._publisher = topics.CHECKLIST.outlet(node)
+        self._diagnostics = topics.DIAGNOSTICS.outlet(node)
         node.create_service(Trigger, "~/confirm", self._answer("confirm", self._checklist.confirm))
         node.create_service(Trigger, "~/repeat", self._answer("repeat", self._checklist.repeat))
         self._due = self._diagnostics_due = self._fence_due = 0.0

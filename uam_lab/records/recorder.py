@@ -67,8 +67,7 @@ class Progress:
     """Publishes the simulation time up to which every topic is recorded."""
 
     def __init__(self, node: Node) -> None:
-        topic = topics.RECORDED_UNTIL
-        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._publisher = topics.RECORDED_UNTIL.outlet(node)
         self._writer, self._until = Template(Clock()), 0
 
     def tell(self, until: int) -> None:
@@ -180,9 +179,7 @@ def main() -> int:
         process_options.apply(ProcessParameters(fifo_priority=options.fifo_priority))
     except ParameterError as error:
         return refuse(NAME, error)
-    health = node.create_publisher(
-        topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
-    )
+    health = topics.DIAGNOSTICS.outlet(node)
     progress = Progress(node)
     services = ServingExecutor()
     services.add_node(node)

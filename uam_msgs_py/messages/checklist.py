@@ -7,10 +7,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from uam_msgs_py.messages.ros_time import set_stamp
-from uam_msgs_py.messages.status import ERROR, OK, STALE, ChecklistState
+from uam_msgs_py.messages.status import (
+    ERROR,
+    OK,
+    STALE,
+    ChecklistState,
+    diagnostics,
+    status_of,
+    texts_of,
+)
 
 PASSED, FAILED, OPEN = "passed", "failed", "open"
 LEVELS = {PASSED: OK, FAILED: ERROR, OPEN: STALE}
@@ -43,17 +50,11 @@ def _status(item: ChecklistItem) -> DiagnosticStatus:
     values = {
         "kind": item.kind,
         "limit": item.limit,
-        "passed": str(item.result == PASSED),
+        "passed": item.result == PASSED,
         "time": item.time,
-        "confirmed": str(item.confirmed),
+        "confirmed": item.confirmed,
     }
-    return DiagnosticStatus(
-        level=LEVELS.get(item.result, STALE),
-        name=item.name,
-        hardware_id="uam",
-        message=item.value,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
+    return status_of(item.name, LEVELS.get(item.result, STALE), item.value, values)
 
 
 def read_items(message: DiagnosticArray) -> list[ChecklistItem]:
@@ -63,7 +64,7 @@ def read_items(message: DiagnosticArray) -> list[ChecklistItem]:
     for status in message.status:
         if status.name == ChecklistState.NAME:
             continue
-        texts = {pair.key: pair.value for pair in status.values}
+        texts = texts_of(status)
         found.append(
             ChecklistItem(
                 status.name,
@@ -89,24 +90,17 @@ class ReportedCheck(Protocol):
 
 def preflight_message(stamp: int, checks: Iterable[ReportedCheck]) -> DiagnosticArray:
     """Return the message; stamp [ns]."""
-    array = DiagnosticArray(
-        status=[
-            DiagnosticStatus(
-                level=OK if check.passed else ERROR,
-                name=check.name,
-                hardware_id="uam",
-                message=check.value,
-                values=[KeyValue(key="limit", value=check.limit)],
-            )
-            for check in checks
-        ]
+    levels = {True: OK, False: ERROR}
+    return diagnostics(
+        stamp,
+        [
+            status_of(one.name, levels[one.passed], one.value, {"limit": one.limit})
+            for one in checks
+        ],
     )
-    set_stamp(array.header.stamp, stamp)
-    return array
 
 
 def read_preflight(message: DiagnosticArray) -> Iterator[tuple[str, str, str, bool]]:
     """Yield name, value, limit and whether it passed, of each check."""
     for status in message.status:
-        limit = {pair.key: pair.value for pair in status.values}.get("limit", "")
-        yield status.name, status.message, limit, status.level == OK
+        yield status.name, status.message, texts_of(status).get("limit", ""), status.level == OK

@@ -57,11 +57,7 @@ def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.
         values = message.numbers(field)
         if len(values) != len(order):
             raise BadMessage(f"{len(values)} {what} for {len(order)} joints")
-        if order != names:
-            try:
-                values = values[[order.index(name) for name in names]]
-            except ValueError:
-                check_names(order, names)
+        values = _ordered(values, order, names)
         refuse_infinite(what, values, names)
         found.append(values)
     return message.stamp, *found
@@ -87,12 +83,17 @@ def read_efforts(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray]:
     Raises BadMessage if one of `names` is missing.
     """
     stamp, order, effort = read_values(data, "effort")
-    if order != names:
+    return stamp, _ordered(effort, order, names)
+
+
+def _ordered(values: np.ndarray, given: Sequence[str], names: Sequence[str]) -> np.ndarray:
+    """Return the values of the joints `given` in the order of `names`; raises BadMessage."""
+    if given != names:
         try:
-            effort = effort[[order.index(name) for name in names]]
+            return values[[given.index(name) for name in names]]
         except ValueError:
-            check_names(order, names)
-    return stamp, effort
+            check_names(given, names)
+    return values
 
 
 def read_grip(data: bytes) -> np.ndarray | None:

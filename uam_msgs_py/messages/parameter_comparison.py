@@ -9,11 +9,11 @@ import json
 from dataclasses import dataclass
 from typing import Self
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from uam_control.settings.json_text import read_json
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.status import ERROR, OK, STALE
+from uam_msgs_py.messages.status import ERROR, OK, STALE, status_of, texts_of
 
 
 @dataclass(frozen=True)
@@ -62,22 +62,9 @@ class ParameterComparison:
 
     def to_status(self) -> DiagnosticStatus:
         """Return the status."""
-        values = {
-            "read": str(self.read),
-            "required": str(self.required),
-            "complete": str(self.complete),
-        }
-        for one in self.differences:
-            values[one.name] = json.dumps(
-                {"found": one.found, "required": one.required, "why": one.why}
-            )
-        return DiagnosticStatus(
-            level=self.level,
-            name=self.NAME,
-            hardware_id="uam",
-            message=self.summary,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
+        counts = {"read": self.read, "required": self.required, "complete": self.complete}
+        values = {one.name: json.dumps(_entry(one)) for one in self.differences}
+        return status_of(self.NAME, self.level, self.summary, counts | values)
 
     @classmethod
     def from_message(cls, message: DiagnosticArray) -> Self | None:
@@ -85,7 +72,7 @@ class ParameterComparison:
         status = next((s for s in message.status if s.name == cls.NAME), None)
         if status is None:
             return None
-        texts = {pair.key: pair.value for pair in status.values}
+        texts = texts_of(status)
         try:
             read, required = int(texts.pop("read")), int(texts.pop("required"))
             complete = texts.pop("complete") == "True"
@@ -93,6 +80,10 @@ class ParameterComparison:
         except (KeyError, ValueError, TypeError) as error:
             raise BadMessage(f"{cls.NAME}: {error!r}") from None
         return cls(read, required, complete, differences)
+
+
+def _entry(one: ParameterDifference) -> dict[str, float | str | None]:
+    return {"found": one.found, "required": one.required, "why": one.why}
 
 
 def _difference(name: str, text: str) -> ParameterDifference:

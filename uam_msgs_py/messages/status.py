@@ -1,6 +1,7 @@
 """States in a diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import ClassVar, Self
 
@@ -9,38 +10,42 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.ros_time import nanoseconds, set_stamp
 
-OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK,
-    DiagnosticStatus.WARN,
-    DiagnosticStatus.ERROR,
-    DiagnosticStatus.STALE,
-)
+OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
+ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
+
+
+def status_of(name: str, level: bytes, message: str, values: dict[str, object]) -> DiagnosticStatus:
+    """Return a status; a None in `values` becomes ""."""
+    texts = {key: "" if value is None else str(value) for key, value in values.items()}
+    pairs = [KeyValue(key=key, value=text) for key, text in texts.items()]
+    return DiagnosticStatus(
+        level=level, name=name, hardware_id="uam", message=message, values=pairs
+    )
+
+
+def texts_of(status: DiagnosticStatus) -> dict[str, str]:
+    """Return the values of a status: key → text."""
+    return {pair.key: pair.value for pair in status.values}
+
+
+def diagnostics(stamp: int, statuses: Iterable[DiagnosticStatus]) -> DiagnosticArray:
+    """Return the message with these; stamp [ns]."""
+    array = DiagnosticArray(status=list(statuses))
+    set_stamp(array.header.stamp, stamp)
+    return array
 
 
 def diagnostic(
     stamp: int, name: str, level: bytes, message: str, values: dict[str, object]
 ) -> DiagnosticArray:
-    """Return a DiagnosticArray with one status; stamp [ns]; a None in `values` becomes ""."""
-    status = DiagnosticStatus(
-        level=level,
-        name=name,
-        hardware_id="uam",
-        message=message,
-        values=[
-            KeyValue(key=key, value="" if value is None else str(value))
-            for key, value in values.items()
-        ],
-    )
-    array = DiagnosticArray(status=[status])
-    set_stamp(array.header.stamp, stamp)
-    return array
+    """Return a DiagnosticArray with one status, see `status_of`; stamp [ns]."""
+    return diagnostics(stamp, [status_of(name, level, message, values)])
 
 
 def only_status(message: DiagnosticArray) -> tuple[int, DiagnosticStatus, dict[str, str]]:
     """Return (stamp [ns], status, key → text) of a message with one status, else ValueError."""
     (status,) = message.status
-    texts = {pair.key: pair.value for pair in status.values}
-    return nanoseconds(message.header.stamp), status, texts
+    return nanoseconds(message.header.stamp), status, texts_of(status)
 
 
 class _Status:
@@ -59,8 +64,7 @@ class _Status:
         found = [status for status in message.status if status.name == cls.NAME]
         if not found:
             raise BadMessage(f"no status '{cls.NAME}' in the message")
-        texts = {pair.key: pair.value for pair in found[0].values}
-        values = {}
+        texts, values = texts_of(found[0]), {}
         for item in fields(cls):
             if item.name not in texts:
                 if item.name in cls.LATER:

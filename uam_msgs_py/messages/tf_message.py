@@ -38,24 +38,24 @@ LITTLE_ENDIAN = b"\0\1\0\0"  # the encapsulation of plain CDR
 NUMBERS = 7  # translation x y z, rotation x y z w
 
 
-def _structure(**fields: type) -> type[ctypes.Structure]:
+def structure(**fields: type) -> type[ctypes.Structure]:
     """Return the class of a C structure with these fields, in order."""
     return type("_Structure", (ctypes.Structure,), {"_fields_": list(fields.items())})
 
 
 # Fields that are only copied have one name together.
-_Hash = _structure(version=c_uint8, value=c_uint8 * 32)
-_String = _structure(data=c_char_p, size=c_size_t, capacity=c_size_t)
-_Sequence = _structure(data=c_void_p, size=c_size_t, capacity=c_size_t)
-_FieldType = _structure(type_id=c_uint8, capacities=c_uint64 * 2, nested_type_name=_String)
-_Field = _structure(name=_String, type=_FieldType, default_value=_String)
-_IndividualDescription = _structure(type_name=_String, fields=_Sequence)
-_Description = _structure(own=_IndividualDescription, referenced=_Sequence)
+_Hash = structure(version=c_uint8, value=c_uint8 * 32)
+_String = structure(data=c_char_p, size=c_size_t, capacity=c_size_t)
+_Sequence = structure(data=c_void_p, size=c_size_t, capacity=c_size_t)
+_FieldType = structure(type_id=c_uint8, capacities=c_uint64 * 2, nested_type_name=_String)
+_Field = structure(name=_String, type=_FieldType, default_value=_String)
+_IndividualDescription = structure(type_name=_String, fields=_Sequence)
+_Description = structure(own=_IndividualDescription, referenced=_Sequence)
 # message_type_support_callbacks_t of rosidl_typesupport_fastrtps
-_Callbacks = _structure(namespace=c_char_p, name=c_char_p, functions=c_void_p * 5)
+_Callbacks = structure(namespace=c_char_p, name=c_char_p, functions=c_void_p * 5)
 # MessageMember and MessageMembers of rosidl_typesupport_introspection_c
-_Member = _structure(name=c_char_p, type=c_uint64 * 2, members=c_void_p, rest=c_uint64 * 10)
-_Members = _structure(
+_Member = structure(name=c_char_p, type=c_uint64 * 2, members=c_void_p, rest=c_uint64 * 10)
+_Members = structure(
     namespace=c_char_p,
     name=c_char_p,
     sizes=c_uint64 * 3,

@@ -10,11 +10,14 @@ body.
 """
 
 from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState, Joy, Temperature
@@ -95,6 +98,10 @@ class Topic:
     optional: bool = False
     one_publisher: bool = True
     recorded: bool = True
+
+    def outlet(self, node: Node, **how: Any) -> Publisher:
+        """Return a publisher of this topic; how: see `Node.create_publisher`."""
+        return node.create_publisher(self.type, self.name, self.qos, **how)
 
     @property
     def reading(self) -> QoSProfile:

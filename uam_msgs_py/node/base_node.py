@@ -81,7 +81,7 @@ class UamNode(TunableNode):
 
     def publisher(self, topic: Topic) -> Publisher:
         """Return a publisher of `topic`."""
-        made = self.outlets[topic.name] = self.create_publisher(topic.type, topic.name, topic.qos)
+        made = self.outlets[topic.name] = topic.outlet(self)
         self.times.watch(made, topic)
         return made
 

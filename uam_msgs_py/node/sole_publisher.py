@@ -23,6 +23,7 @@ from ctypes import POINTER, c_bool, c_int, c_int64, c_size_t, c_uint8, c_uint64,
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from uam_msgs_py.messages.tf_message import structure
 from uam_msgs_py.node.rightful import Rightful, full_name
 from uam_msgs_py.node.wiring import NAMELESS
 
@@ -38,32 +39,17 @@ OK = 0  # RCL_RET_OK and RMW_RET_OK
 GID_SIZE = 16  # RMW_GID_STORAGE_SIZE
 
 
-class _Allocator(ctypes.Structure):
-    _fields_ = [
-        (name, c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero", "state")
-    ]
-
-
-class _Bytes(ctypes.Structure):
-    _fields_ = [
-        ("buffer", c_void_p),
-        ("length", c_size_t),
-        ("capacity", c_size_t),
-        ("allocator", _Allocator),
-    ]
-
-
-class _Info(ctypes.Structure):
-    _fields_ = [
-        ("source_timestamp", c_int64),
-        ("received_timestamp", c_int64),
-        ("publication_sequence_number", c_uint64),
-        ("reception_sequence_number", c_uint64),
-        ("gid_implementation", c_void_p),
-        ("gid", c_uint8 * GID_SIZE),
-        ("from_intra_process", c_bool),
-    ]
-
+_Allocator = structure(functions=c_void_p * 4, state=c_void_p)
+_Bytes = structure(buffer=c_void_p, length=c_size_t, capacity=c_size_t, allocator=_Allocator)
+_Info = structure(
+    source_timestamp=c_int64,
+    received_timestamp=c_int64,
+    publication_sequence_number=c_uint64,
+    reception_sequence_number=c_uint64,
+    gid_implementation=c_void_p,
+    gid=c_uint8 * GID_SIZE,
+    from_intra_process=c_bool,
+)
 
 _take = rcl.rcl_take_serialized_message
 _take.argtypes = [c_void_p, POINTER(_Bytes), POINTER(_Info), c_void_p]

@@ -44,29 +44,16 @@ RESULTS = (
 
 
 class NoTickTimes:
-    """Measures nothing."""
+    """Measures nothing: for the methods see TickTimes."""
 
-    def lap(self, part: int) -> None:
-        """Do nothing, as the other methods."""
-
-    def rest(self) -> None:
+    def lap(self, *_: object) -> None:
         """Do nothing."""
 
-    def woken(self) -> None:
-        """Do nothing."""
-
-    def tick(self, stamp: int) -> None:
-        """Do nothing."""
-
-    def watch(self, publisher: Publisher, topic: topics.Topic) -> None:
-        """Do nothing."""
+    rest = woken = tick = watch = close = lap
 
     def measured(self, send: Callable[[], None]) -> Callable[[], None]:
         """Return `send` itself."""
         return send
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 class TickTimes(NoTickTimes):

@@ -32,9 +32,7 @@ class TunableNode(Node):
         adopt_sections(self)
         self.stamp = 0  # [ns] of the newest tick
         self.door = Door(self)
-        self._changes = self.create_publisher(
-            topics.CHANGES.type, topics.CHANGES.name, topics.CHANGES.qos
-        )
+        self._changes = topics.CHANGES.outlet(self)
         self.create_service(SetParametersAtomically, f"~/{CHECK}", self._on_check)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:

@@ -15,8 +15,7 @@ class FaultTopic:
     """Publishes the beginning and end of faults."""
 
     def __init__(self, node: Node):
-        topic = topics.FAULTS
-        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._publisher = topics.FAULTS.outlet(node)
 
     def publish(self, stamp: int, changed: Iterable[FaultState]) -> None:
         """Publish the events at `stamp` [ns]."""

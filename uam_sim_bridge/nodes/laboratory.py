@@ -66,7 +66,7 @@ class DriverTopic:
     def __init__(self, node: Node, name: str, topic: Topic, writer: Any, latency: int) -> None:
         """node: in whose namespace; writer: fills the message; latency [ticks]."""
         self._own = Node(name, namespace=node.get_namespace())
-        self._publisher = self._own.create_publisher(topic.type, topic.name, topic.qos)
+        self._publisher = topic.outlet(self._own)
         self._writer, self._delay = writer, Delay(latency)
 
     def publish(self, tick: int, sample: tuple | None, shift: float, plugged: bool = True) -> None:

@@ -26,8 +26,7 @@ class PlantHealth:
     """
 
     def __init__(self, node: Node, answers: Answers, statistics: Statistics):
-        topic = topics.DIAGNOSTICS
-        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._publisher = topics.DIAGNOSTICS.outlet(node)
         self._name, self._namespace = label(node), node.get_namespace()
         self._answers, self._statistics = answers, statistics
         self._loop = LoopTime()

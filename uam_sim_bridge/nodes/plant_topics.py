@@ -54,10 +54,7 @@ class Outlets:
         """times: measures the publications."""
         events = PublisherEventCallbacks(use_default_callbacks=False)
         self.outlets: dict[str, Publisher] = {
-            topic.name: node.create_publisher(
-                topic.type, topic.name, topic.qos, event_callbacks=events
-            )
-            for topic in chosen
+            topic.name: topic.outlet(node, event_callbacks=events) for topic in chosen
         }
         for topic in chosen if times else ():
             times.watch(self.outlets[topic.name], topic)

@@ -152,10 +152,8 @@ class RestartTopic:
 
     def __init__(self, node: Node) -> None:
         self._prefix = prefix(node.get_namespace())
-        self._restarts, self._diagnostics = (
-            node.create_publisher(topic.type, topic.name, topic.qos)
-            for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
-        )
+        self._restarts = topics.RESTARTS.outlet(node)
+        self._diagnostics = topics.DIAGNOSTICS.outlet(node)
 
     def publish(self, stamp: int, node: str, text: str) -> None:
         """Publish the restart of `node`; stamp [ns]: of the flight's clock."""
