@@ -31,6 +31,7 @@ from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.node_names import WHOLE_BODY
 from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Ahead, StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters, given
@@ -85,8 +86,8 @@ class ControllerNode(UamNode):
         }
         for topic in inputs:
             self.listen(topic, partial(self._add, topic.name, readers[topic]))
-        self.create_service(Trigger, f"~/{RESET}", self.reset)
-        self.create_service(SetBool, f"~/{FREEZE}", self.freeze)
+        offer(self, Trigger, f"~/{RESET}", self.reset)
+        offer(self, SetBool, f"~/{FREEZE}", self.freeze)
 
     def _add(self, name: str, read: Callable[[bytes], tuple], data: bytes) -> None:
         self._join.add(name, *read(data))
@@ -130,25 +131,22 @@ class ControllerNode(UamNode):
         """Return the message of a command; see `send`."""
         raise NotImplementedError
 
-    def reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Set the adapted gains to their initial values."""
+    def reset(self) -> tuple[bool, str]:
+        """Set the adapted gains to their initial values; see `offer`."""
         controller = self.controller
         old = self._adapted()
         controller.reset_adaptation()
         new = self._adapted()
         changed = {name: (old[name], new[name]) for name in new if new[name] != old[name]}
         self.publish_change(ParameterChange(self.get_name(), RESET, changed))
-        response.success = True
-        response.message = f"adapted gains at their initial values: {_listed(new)}"
-        return response
+        return True, f"adapted gains at their initial values: {_listed(new)}"
 
-    def freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Set the parameter `adapt`, so that service and parameter always agree."""
-        result = self.change_parameters([Parameter("adapt", value=not request.data)], FREEZE)
-        frozen = "frozen at" if request.data else "free, from"
-        response.success = result.successful
-        response.message = result.reason or f"adapted gains {frozen}: {_listed(self._adapted())}"
-        return response
+    def freeze(self, frozen: bool) -> tuple[bool, str]:
+        """Set the parameter `adapt`, so that service and parameter always agree; see `offer`."""
+        result = self.change_parameters([Parameter("adapt", value=not frozen)], FREEZE)
+        how = "frozen at" if frozen else "free, from"
+        done = f"adapted gains {how}: {_listed(self._adapted())}"
+        return result.successful, result.reason or done
 
     def _adapted(self) -> dict[str, float]:
         return dict(zip(self.controller.names, self.controller.adaptation.tolist(), strict=True))

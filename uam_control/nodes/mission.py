@@ -24,7 +24,7 @@ from uam_control.mission import (
 )
 from uam_control.nodes.described import described_hand, described_scenario, described_vehicle
 from uam_control.nodes.mission_errors import TrackingErrors
-from uam_control.nodes.mission_inputs import MissionInputs, offer
+from uam_control.nodes.mission_inputs import MissionInputs, offer_commands
 from uam_control.nodes.planner_inputs import PlannerInputs
 from uam_control.profiles.profile import (
     BRIDGE,
@@ -142,7 +142,7 @@ class MissionNode(UamNode):
             self.listen(topics.CHECKLIST, self._on_checklist, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
-        offer(self, self._mission)
+        offer_commands(self, self._mission)
         self._planners = PlannerInputs(
             self, self._mission, vehicle.joint_names, self._flyer, self._publish_answer
         )

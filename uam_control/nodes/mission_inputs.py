@@ -37,6 +37,7 @@ from uam_msgs_py.messages.convert import (
     read_values,
 )
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
+from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import UamNode
 
 GAINS = (
@@ -129,29 +130,9 @@ class MissionInputs:
         self._inputs.gains(stamp / SECOND, subsystem, names, values)
 
 
-def offer(node: Node, mission: Mission) -> None:
+def offer_commands(node: Node, mission: Mission) -> None:
     """Create the services of `mission` in `node`; they run between two ticks."""
-
-    def answer(
-        what: str, response: Trigger.Response | SetBool.Response, result: tuple[bool, str]
-    ) -> Trigger.Response | SetBool.Response:
-        response.success, response.message = result
-        node.get_logger().info(f"command {what}: {response.message}")
-        return response
-
-    def on_command(
-        name: str, command: OperatorCommand, request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
-        return answer(name, response, mission.request(command))
-
-    def on_start(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return answer(START, response, mission.start())
-
-    def on_magnet(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        what = f"{MAGNET} {'on' if request.data else 'off'}"
-        return answer(what, response, mission.switch_magnet(request.data))
-
     for name, command in COMMANDS.items():
-        node.create_service(Trigger, f"~/{name}", partial(on_command, name, command))
-    node.create_service(Trigger, f"~/{START}", on_start)
-    node.create_service(SetBool, f"~/{MAGNET}", on_magnet)
+        offer(node, Trigger, f"~/{name}", partial(mission.request, command))
+    offer(node, Trigger, f"~/{START}", mission.start)
+    offer(node, SetBool, f"~/{MAGNET}", mission.switch_magnet)

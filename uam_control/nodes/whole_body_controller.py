@@ -9,7 +9,6 @@ concerns the law as a whole.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
 
 import numpy as np
 from std_srvs.srv import SetBool, Trigger
@@ -21,10 +20,9 @@ from uam_control.nodes.position_controller import PositionControllerNode
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.law_stages import WholeBodyPart, WholeBodyStage
 from uam_msgs_py.messages.node_names import WHOLE_BODY
+from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import UamNode, run_together
 from uam_msgs_py.node.executor import spin as spin_nodes
-
-Answer = TypeVar("Answer", Trigger.Response, SetBool.Response)
 
 
 class WholeBodyNode(UamNode):
@@ -34,20 +32,12 @@ class WholeBodyNode(UamNode):
         """parts: the controllers, in the order in which they act in a tick."""
         super().__init__(WHOLE_BODY)
         self._parts = tuple(parts)
-        self.create_service(Trigger, f"~/{RESET}", self._on_reset)
-        self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
+        offer(self, Trigger, f"~/{RESET}", lambda: _together([one.reset() for one in parts]))
+        offer(self, SetBool, f"~/{FREEZE}", lambda on: _together([one.freeze(on) for one in parts]))
 
     def settle(self) -> None:
         """Count the ticks of the controllers."""
         self.stamp, self.ticks = self._parts[-1].stamp, self._parts[-1].ticks
-
-    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        answers = [node.reset(request, Trigger.Response()) for node in self._parts]
-        return _together(answers, response)
-
-    def _on_freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        answers = [node.freeze(request, SetBool.Response()) for node in self._parts]
-        return _together(answers, response)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         level, summary, values = super().diagnose()
@@ -60,11 +50,10 @@ class WholeBodyNode(UamNode):
         return level, summary, values
 
 
-def _together(answers: Sequence[Answer], response: Answer) -> Answer:
-    """Write the answers of all controllers into one."""
-    response.success = all(answer.success for answer in answers)
-    response.message = "; ".join(answer.message for answer in answers)
-    return response
+def _together(answers: Sequence[tuple[bool, str]]) -> tuple[bool, str]:
+    """Return the answers of all controllers as one."""
+    done, texts = zip(*answers, strict=True)
+    return all(done), "; ".join(texts)
 
 
 def make() -> list[UamNode]:

@@ -6,12 +6,10 @@ mission starts with `require_checklist` only when all items have passed.
 
 import json
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
@@ -34,8 +32,8 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, checklist_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.answering import ServingExecutor
-from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.answering import ServingExecutor, offer
+from uam_msgs_py.node.base_node import StopSignal, run_with
 from uam_msgs_py.node.namespace import label
 from uam_msgs_py.node.node_parameters import NodeParameters, plain, refuse_unknown
 from uam_msgs_py.node.rightful import rightful_nodes
@@ -114,8 +112,8 @@ class ChecklistNode:
         self._services = Services(node)
         self._publisher = topics.CHECKLIST.outlet(node)
         self._diagnostics = topics.DIAGNOSTICS.outlet(node)
-        node.create_service(Trigger, "~/confirm", self._answer("confirm", self._checklist.confirm))
-        node.create_service(Trigger, "~/repeat", self._answer("repeat", self._checklist.repeat))
+        offer(node, Trigger, "~/confirm", self._checklist.confirm)
+        offer(node, Trigger, "~/repeat", self._checklist.repeat)
         self._due = self._diagnostics_due = self._fence_due = 0.0
         self._published: ChecklistState | None = None
         self._begun: tuple[str, int] = ("", 0)  # name and try of the step that was acted for
@@ -125,16 +123,6 @@ class ChecklistNode:
     def _set_limits(self, limits: ChecklistParameters) -> None:
         """Use new limits: the guided steps begin anew with them."""
         self._checklist.steps[:] = guided(self._vehicle.joint_names, limits, self._options.magnet)
-
-    def _answer(
-        self, name: str, act: Callable[[], tuple[bool, str]]
-    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
-        def answered(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = act()
-            self._node.get_logger().info(f"command {name}: {response.message}")
-            return response
-
-        return answered
 
     def look(self) -> None:
         """Take new messages, judge, publish."""
@@ -259,18 +247,18 @@ class ChecklistNode:
 def main() -> int:
     """Run the checklist until SIGINT or SIGTERM; return the exit status."""
     stop = StopSignal()
-    node = begin(NAME)
-    if node is None:
-        return REFUSED
-    try:
-        options = NodeParameters(node, ChecklistOptions, read_only=True).current
-        limits = NodeParameters(node, ChecklistParameters)
-        vehicle = described_vehicle(node)
-        watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
-        checklist = ChecklistNode(node, watcher, vehicle, options, limits)
-        refuse_unknown(node)
-    except ParameterError as error:
-        return refuse(NAME, error)
+    status = run_with(NAME, lambda node: _check(node, stop))
+    stop.ignore()
+    return status
+
+
+def _check(node: Node, stop: StopSignal) -> int:
+    options = NodeParameters(node, ChecklistOptions, read_only=True).current
+    limits = NodeParameters(node, ChecklistParameters)
+    vehicle = described_vehicle(node)
+    watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
+    checklist = ChecklistNode(node, watcher, vehicle, options, limits)
+    refuse_unknown(node)
     executor = ServingExecutor()
     executor.add_node(node)
     while not stop.raised:
@@ -279,9 +267,6 @@ def main() -> int:
         while (left := end - time.monotonic()) > 0.0 and not stop.raised:
             executor.spin_once(timeout_sec=left)
     watcher.destroy_node()
-    node.destroy_node()
-    rclpy.try_shutdown()
-    stop.ignore()
     return 0
 
 

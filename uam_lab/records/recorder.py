@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
@@ -33,7 +32,7 @@ from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import process_options, wiring
 from uam_msgs_py.node.answering import ServingExecutor
-from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, run_with
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
@@ -167,18 +166,16 @@ def main() -> int:
     """
     # the signal must not close the ROS context: received messages are still to be written
     stop = StopSignal()
-    node = begin(NAME)
-    if node is None:
-        return REFUSED
+    return run_with(NAME, lambda node: _record(node, stop))
+
+
+def _record(node: Node, stop: StopSignal) -> int:
     log = node.get_logger()
-    try:
-        options = NodeParameters(node, RecorderParameters, read_only=True).current
-        rightful = rightful_nodes(node)
-        refuse_unknown(node)
-        recording = _open(node, options, rightful)
-        process_options.apply(ProcessParameters(fifo_priority=options.fifo_priority))
-    except ParameterError as error:
-        return refuse(NAME, error)
+    options = NodeParameters(node, RecorderParameters, read_only=True).current
+    rightful = rightful_nodes(node)
+    refuse_unknown(node)
+    recording = _open(node, options, rightful)
+    process_options.apply(ProcessParameters(fifo_priority=options.fifo_priority))
     health = topics.DIAGNOSTICS.outlet(node)
     progress = Progress(node)
     services = ServingExecutor()
@@ -210,8 +207,6 @@ def main() -> int:
     recording.drain()
     _complete(node, recording, options.statistics)
     services.shutdown()
-    node.destroy_node()
-    rclpy.shutdown()
     return 0
 
 

@@ -7,7 +7,9 @@ from collections.abc import Callable, Coroutine
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
+from rclpy.node import Node
 from rclpy.service import Service
+from std_srvs.srv import SetBool, Trigger
 
 
 def answered(service: Service) -> bool:
@@ -35,6 +37,27 @@ def answered(service: Service) -> bool:
 def _tell(service: Service, error: Exception) -> None:
     text = f"{service.service_name}: request refused: {type(error).__name__}: {error}"
     get_logger(service.logger_name).error(text)
+
+
+def offer(
+    node: Node, kind: type[Trigger | SetBool], name: str, act: Callable[..., tuple[bool, str]]
+) -> None:
+    """Offer a command as a service.
+
+    act: returns whether it is done, and a text, which is logged, too; a SetBool passes its value.
+    """
+    said = name.removeprefix("~/")
+
+    def answer(
+        request: Trigger.Request | SetBool.Request, response: Trigger.Response | SetBool.Response
+    ) -> Trigger.Response | SetBool.Response:
+        asked = [request.data] if kind is SetBool else []
+        response.success, response.message = act(*asked)
+        words = " ".join([said, *("on" if one else "off" for one in asked)])
+        node.get_logger().info(f"command {words}: {response.message}")
+        return response
+
+    node.create_service(kind, name, answer)
 
 
 class ServingExecutor(SingleThreadedExecutor):

@@ -312,20 +312,24 @@ def run_together(
         faulthandler.cancel_dump_traceback_later()
 
 
-def begin(name: str, kind: type[N] = Node) -> N | None:
-    """Create the node of a process that does not `run` one.
+def run_with(name: str, work: Callable[[N], int], kind: type[N] = Node) -> int:
+    """Create the node of a process that does not `run` one; return work(node), its exit status.
 
-    None: bad arguments or parameter files, after one line on stderr; the exit status is REFUSED.
+    2: bad arguments, parameter files or parameters, in one line on stderr.
     """
     if not _initialized(name):
-        return None
+        return REFUSED
+    node = None
     try:
         node = kind(name)
         adopt_sections(node)  # a TunableNode has done so itself
+        return work(node)
     except ParameterError as error:
-        refuse(name, error)
-        return None
-    return node
+        return refuse(name, error)
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def _initialized(name: str) -> bool:

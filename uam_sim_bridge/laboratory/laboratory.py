@@ -37,7 +37,7 @@ from uam_sim_bridge.laboratory.person import Grip, joint_torque, wrench
 from uam_sim_bridge.laboratory.tracked_room import RoomBody
 from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain, mistaken_room
 from uam_sim_bridge.mavlink.hil.hil_server import HilServer
-from uam_sim_bridge.plant import Samples, Truth, Vehicle
+from uam_sim_bridge.plant import Samples, Truth, Vehicle, warm_up
 from uam_sim_bridge.plant.engines import plant_class
 
 ADAPTER_LATENCY = 0.001  # [s] latency timer of the servo bus's adapter
@@ -253,12 +253,3 @@ def servos_of(
         one.set(names.CURRENT_LIMIT, servo.current_limit_counts)
         made.append(one)
     return made
-
-
-def warm_up(spare: object) -> None:
-    """Compile the functions of a tick with a spare plant: a first call takes long."""
-    rotors = len(spare.vehicle.description.rotors)
-    for _ in range(10):
-        spare.sense()
-        spare.truth()
-        spare.step(np.zeros(rotors), np.zeros(spare.joints), False)

@@ -29,6 +29,7 @@ from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import GRIPPER, JointStateWriter, read_joint_command
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
+from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refuse_unknown
 from uam_sim_bridge.devices.dynamixel.chain import (
@@ -111,8 +112,8 @@ class ArmDriverNode(UamNode):
             self.listen(topics.REFERENCE, self._on_reference)
         self._armed = False
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
-        self.create_service(Trigger, "~/reboot", self._on_reboot)
-        self.create_service(SetBool, "~/release", self._on_release)
+        offer(self, Trigger, "~/reboot", self._on_reboot)
+        offer(self, SetBool, "~/release", self._on_release)
         refuse_unknown(self)  # before the bus, which may be absent
         self._bus.begin()
         if not self._bus.waits:
@@ -154,34 +155,27 @@ class ArmDriverNode(UamNode):
         reference = read_reference(data, len(self._names))[1]
         self._velocity = reference.values[CHI_DOT, ALPHA:].copy()
 
-    def _on_reboot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_reboot(self) -> tuple[bool, str]:
         if self._bus.problem:
-            response.success, response.message = False, self._bus.problem
-            return response
+            return False, self._bus.problem
         done = self.driver.reboot()
-        response.success = bool(done) and not any("not rebooted" in line for line in done)
-        response.message = "; ".join(done) or "no servo has a hardware error"
-        self.get_logger().info(f"command reboot: {response.message}")
-        return response
+        success = bool(done) and not any("not rebooted" in line for line in done)
+        return success, "; ".join(done) or "no servo has a hardware error"
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         self._armed = AutopilotState.from_message(message)[1].armed
         if self._armed and self.driver.released:
             self.driver.release(False)
 
-    def _on_release(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+    def _on_release(self, released: bool) -> tuple[bool, str]:
         """Release the joints for the checklist, on a disarmed vehicle; or drive them again."""
         if self._bus.problem:
-            response.success, response.message = False, self._bus.problem
-        elif request.data and self._armed:
-            response.success, response.message = False, "refused: the vehicle is armed"
-        else:
-            failed = self.driver.release(request.data)
-            response.success = not failed
-            done = "released: support the arm" if request.data else "driven again"
-            response.message = failed or done
-        self.get_logger().info(f"command release {request.data}: {response.message}")
-        return response
+            return False, self._bus.problem
+        if released and self._armed:
+            return False, "refused: the vehicle is armed"
+        failed = self.driver.release(released)
+        done = "released: support the arm" if released else "driven again"
+        return not failed, failed or done
 
     def _exchange(self) -> None:
         """Run the cycles until the node ends; an error that nothing handles ends the node."""

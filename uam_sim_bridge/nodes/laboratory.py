@@ -18,13 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rclpy
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import CHI
 from uam_control.mission.time_limit import DISARMED, Settled
-from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
@@ -33,7 +31,7 @@ from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.answering import ServingExecutor
-from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
@@ -271,31 +269,25 @@ def main() -> int:
     """
     stop = StopSignal()
     sys.setswitchinterval(SWITCH)
-    node = begin(NAME, TunableNode)
-    if node is None:
-        return REFUSED
-    rehearsal = None
+    return run_with(NAME, lambda node: _rehearse(node, stop), TunableNode)
+
+
+def _rehearse(node: TunableNode, stop: StopSignal) -> int:
+    vehicle, parameters = plant_options.declare_laboratory(node)
+    refuse_unknown(node)
     try:
-        vehicle, parameters = plant_options.declare_laboratory(node)
-        refuse_unknown(node)
-        try:
-            rehearsal = Rehearsal(node, vehicle, parameters, stop)
-        except (ValueError, KeyError, OSError) as error:
-            return refuse(NAME, error)
+        rehearsal = Rehearsal(node, vehicle, parameters, stop)
+    except (ValueError, KeyError, OSError) as error:
+        return refuse(NAME, error)
+    try:
         rehearsal.await_autopilot()
         rehearsal.run()
         return 0
-    except ParameterError as error:
-        return refuse(NAME, error)
     finally:
-        if rehearsal is not None:
-            if parameters.statistics:
-                Path(parameters.statistics).write_text(
-                    json.dumps(rehearsal.report()), encoding="utf-8"
-                )
-            rehearsal.close()
-        node.destroy_node()
-        rclpy.try_shutdown()
+        if parameters.statistics:
+            text = json.dumps(rehearsal.report())
+            Path(parameters.statistics).write_text(text, encoding="utf-8")
+        rehearsal.close()
 
 
 if __name__ == "__main__":

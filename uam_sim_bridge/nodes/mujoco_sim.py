@@ -30,18 +30,16 @@ import time
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-import rclpy
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import POSITION
 from uam_control.mission.time_limit import DISARMED, Settled
-from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.answering import offer
+from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tick_times import tick_times
@@ -63,7 +61,7 @@ from uam_sim_bridge.nodes.plant_topics import (
     nanoseconds,
 )
 from uam_sim_bridge.paced_clock import PacedClock, Patience
-from uam_sim_bridge.plant import PhysicsError, Plant, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Vehicle, warm_up
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
 
@@ -102,8 +100,8 @@ class Simulator:
         self._fault_topic = FaultTopic(node) if faults else None
         self._first_tick = 0
         self._reset_due = False
-        node.create_service(Trigger, "~/reset", self._on_reset)
-        _warm_up(make_plant(*start, Schedule(), options.plant))
+        offer(node, Trigger, "~/reset", self._on_reset)
+        warm_up(make_plant(*start, Schedule(), options.plant))
         self._times = tick_times(declared.tick_times)
         self._odometry = OdometryDrift.NAME in vehicle.numbers["effects"]
         sensors = node, described, options.publish_imu, self._times, self._odometry
@@ -191,16 +189,12 @@ class Simulator:
             self.plant.count_from(self._first_tick)
             self._log.info(f"the nodes are from an earlier simulation: begins at {after:.1f} s")
 
-    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_reset(self) -> tuple[bool, str]:
         """Put the simulated world back to its start; time goes on."""
-        response.success = not self.hil.armed
-        if response.success:
-            self._reset_due = True
-            response.message = "vehicle and payload at their start; time goes on"
-        else:
-            response.message = "refused: the vehicle is armed"
-        self._log.info(f"command reset: {response.message}")
-        return response
+        if self.hil.armed:
+            return False, "refused: the vehicle is armed"
+        self._reset_due = True
+        return True, "vehicle and payload at their start; time goes on"
 
     def _reset(self) -> None:
         """Make the plant anew at the present tick."""
@@ -387,15 +381,6 @@ class Simulator:
         self.executor.shutdown()
 
 
-def _warm_up(spare: Plant) -> None:
-    """Compile the functions of a tick with a spare plant: a first call takes long."""
-    for _ in range(10):
-        spare.sense()
-        spare.truth()
-        rotors = len(spare.vehicle.description.rotors)
-        spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
-
-
 def _listed(waiting: list[str]) -> str:
     """Return the first four as a text, with the number of the others."""
     shown = "; ".join(waiting[:4])
@@ -410,36 +395,29 @@ def main() -> int:
     """
     stop = StopSignal()
     # The context must outlive the signal, as there are statistics to write and links to close.
-    node = begin(NAME, TunableNode)
-    if node is None:
-        return REFUSED
-    simulator = None
+    return run_with(NAME, lambda node: _simulate(node, stop), TunableNode)
+
+
+def _simulate(node: TunableNode, stop: StopSignal) -> int:
+    options = declare(node)
+    refuse_unknown(node)
     try:
-        options = declare(node)
-        refuse_unknown(node)
-        try:
-            simulator = Simulator(node, options, stop)
-        except (ValueError, OSError) as error:
-            return refuse(NAME, error)
-        try:
-            simulator.wait_for_nodes()
-            simulator.run()
-        except PlantStopped as error:
-            node.get_logger().fatal(str(error))
-            simulator.statistics.ended_by = str(error)
-            return NOT_READY if isinstance(error, NotReady) else 1
-        return 0
-    except ParameterError as error:
+        simulator = Simulator(node, options, stop)
+    except (ValueError, OSError) as error:
         return refuse(NAME, error)
+    try:
+        simulator.wait_for_nodes()
+        simulator.run()
+        return 0
+    except PlantStopped as error:
+        node.get_logger().fatal(str(error))
+        simulator.statistics.ended_by = str(error)
+        return NOT_READY if isinstance(error, NotReady) else 1
     finally:
-        if simulator is not None:
-            simulator.close()
-            if statistics := options.parameters.statistics:
-                Path(statistics).write_text(
-                    json.dumps(simulator.report().to_mapping()), encoding="utf-8"
-                )
-        node.destroy_node()
-        rclpy.try_shutdown()
+        simulator.close()
+        if statistics := options.parameters.statistics:
+            text = json.dumps(simulator.report().to_mapping())
+            Path(statistics).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,17 @@
 """Simulated vehicle and surroundings, with models of sensors and actuators."""
 
-from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth, TruthRow
+from uam_sim_bridge.plant.plant import (
+    Disturbance,
+    PhysicsError,
+    Plant,
+    Samples,
+    Truth,
+    TruthRow,
+    warm_up,
+)
 from uam_sim_bridge.plant.vehicle import Vehicle
 
-__all__ = ["Disturbance", "PhysicsError", "Plant", "Samples", "Truth", "TruthRow", "Vehicle"]
+__all__ = [
+    *("Disturbance", "PhysicsError", "Plant", "Samples", "Truth", "TruthRow", "Vehicle"),
+    "warm_up",
+]

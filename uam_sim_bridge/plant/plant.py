@@ -234,3 +234,12 @@ class Plant(ABC):
         For the hands of a rehearsal, at the base's origin.
         """
         raise NotImplementedError
+
+
+def warm_up(spare: Plant) -> None:
+    """Compile the functions of a tick with a spare plant: a first call takes long."""
+    rotors = len(spare.vehicle.description.rotors)
+    for _ in range(10):
+        spare.sense()
+        spare.truth()
+        spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
