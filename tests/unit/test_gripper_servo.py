@@ -21,7 +21,8 @@ from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.emulated import ArmShafts, EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.mocap import calibration
-from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory
+from uam_sim_bridge.laboratory.laboratory import Laboratory
+from uam_sim_bridge.laboratory.laboratory_parameters import LaboratoryParameters
 from uam_sim_bridge.plant import Vehicle
 
 VEHICLE = load_description("s500_gripper")
@@ -141,19 +142,12 @@ def test_the_fingers_of_the_plant_follow_the_emulated_servo(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    devices = Devices(
-        folder=tmp_path,
-        chain=chain_with(),
-        baud=921600,
-        body="uam",
-        payload="",
-        calibration=calibration.load("motive_y_up"),
-        mocap_port=0,
-        magnet_line=None,
-    )
-    lab = Laboratory(Vehicle.of(VEHICLE), devices, port, 0.0, 1)
+    where = {"folder": str(tmp_path), "hil_port": port, "mocap_port": 0}
+    parameters = LaboratoryParameters(magnet="servo", payload_mass=0.0, **where)
+    chain = chain_with()
+    lab = Laboratory(Vehicle.of(VEHICLE), parameters, chain, calibration.load("motive_y_up"))
     patient = ArmDriverParameters(answer_timeout=min(PATIENT, 5.0), watchdog=0.0)
-    driver = ArmDriver(replace(devices.chain, device=lab.bus.port), patient)
+    driver = ArmDriver(replace(chain, device=lab.bus.port), patient)
     try:
         driver.start()
         driver.command_gripper(0.02)

@@ -13,7 +13,7 @@ from uam_msgs_py.messages.serialized import MOST_BYTES, deserialized
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus, finite
 from uam_sim_bridge.faults.fault import FaultError
 from uam_sim_bridge.faults.schedule import Schedule
-from uam_sim_bridge.nodes.plant_options import SimulatedParameters
+from uam_sim_bridge.laboratory.laboratory_parameters import SimulatedParameters
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 DEEP = "[" * 100_000

@@ -21,7 +21,8 @@ from uam_sim_bridge.devices.mocap.frame import BodyPose
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
 from uam_sim_bridge.laboratory.cables import Cables
-from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory
+from uam_sim_bridge.laboratory.laboratory import Laboratory
+from uam_sim_bridge.laboratory.laboratory_parameters import LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
 from uam_sim_bridge.laboratory.tracked_room import RoomBody
 from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain
@@ -136,19 +137,17 @@ def laboratory(tmp_path, free_ports):
     made = []
 
     def make(*wiring, magnet=True, **output):
-        devices = Devices(
-            folder=tmp_path,
-            chain=CHAIN,
-            baud=921600,
-            body="uam",
-            payload="",
-            calibration=calibration.load("motive_y_up"),
+        parameters = LaboratoryParameters(
+            folder=str(tmp_path),
             mocap_port=0,
-            magnet_line=tmp_path / "line" if magnet else None,
+            hil_port=free_ports(),
+            magnet="gpio" if magnet else "autopilot",
+            magnet_line=str(tmp_path / "line"),
             **output,
         )
         schedule = Schedule(tuple(one for s in wiring for one in s.faults))
-        made.append(Laboratory(Vehicle.of(VEHICLE), devices, free_ports(), 0.2, 1, (), schedule))
+        cameras = calibration.load("motive_y_up")
+        made.append(Laboratory(Vehicle.of(VEHICLE), parameters, CHAIN, cameras, schedule))
         return made[-1]
 
     yield make
@@ -198,11 +197,11 @@ def test_servos_turn_the_joints_of_the_plant_and_read_them(laboratory):
 def test_the_line_switches_the_magnet_unless_its_wire_is_pulled(laboratory):
     lab = laboratory()
     for content, plugged, expected in (("1", True, True), ("0", True, False), ("1", False, False)):
-        lab.devices.magnet_line.write_text(content)
+        lab.parameters.gpio.write_text(content)
         lab.magnet_plugged = plugged
         ticks(lab, 1)
         assert lab.magnet is expected
-    lab.devices.magnet_line.unlink()
+    lab.parameters.gpio.unlink()
     lab.magnet_plugged = True
     ticks(lab, 1)
     assert lab.magnet is False
@@ -210,7 +209,7 @@ def test_the_line_switches_the_magnet_unless_its_wire_is_pulled(laboratory):
 
 def test_an_inverted_magnet_and_one_of_the_autopilot(laboratory):
     lab = laboratory(mistakes("magnet_inverted"))
-    lab.devices.magnet_line.write_text("0")
+    lab.parameters.gpio.write_text("0")
     ticks(lab, 1)
     assert lab.magnet is True
     other = laboratory(magnet=False)
@@ -259,7 +258,7 @@ def test_each_cable_is_pulled_and_plugged_in_again(laboratory, name):
     def seen():
         line = lab.bus.line
         return (
-            *(lab.devices.folder / device in lab.devices.folder.iterdir() for device in PTYS),
+            *(lab.parameters.places / device in lab.parameters.places.iterdir() for device in PTYS),
             *([one.connected for one in line.servos], line.faults.bit_error_rate),
             *(lab.cable.cut, lab.cable.bit_error_rate, lab.magnet_plugged, lab.hil_plugged),
             *(cables.imu_plugged, [one.temperature for one in lab.servos]),

@@ -20,7 +20,8 @@ from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.devices.mocap.frame import BodyPose
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed
-from uam_sim_bridge.laboratory.laboratory import Devices, Laboratory
+from uam_sim_bridge.laboratory.laboratory import Laboratory
+from uam_sim_bridge.laboratory.laboratory_parameters import LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
 from uam_sim_bridge.laboratory.tracked_room import RoomBody
 from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_room
@@ -39,9 +40,9 @@ class Rehearsed:
 
     def __init__(self, folder, *mistakes):
         wiring = Schedule(tuple(timed({**m, "at": "start"}, {}, "test") for m in mistakes))
-        devices = Devices(folder, CHAIN, 921600, "uam", "", CALIBRATED, 0, folder / "magnet")
-        port = free_port()
-        self.lab = Laboratory(Vehicle.of(VEHICLE), devices, port, 0.2, 1, (), wiring)
+        places = {"folder": str(folder), "magnet_line": str(folder / "magnet")}
+        parameters = LaboratoryParameters(mocap_port=0, hil_port=free_port(), **places)
+        self.lab = Laboratory(Vehicle.of(VEHICLE), parameters, CHAIN, CALIBRATED, wiring)
         (self._body,) = mistaken_room([RoomBody("uam", CALIBRATED)], wiring)
         self.person = Person(VEHICLE.joint_names, self.lab.folded)
         self.steps = guided(VEHICLE.joint_names, ChecklistParameters())

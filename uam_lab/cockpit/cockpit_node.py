@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import psutil
-import rclpy
 from rclpy.node import Node
 
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings import configuration, yaml_file
-from uam_control.settings.parameter_set import ParameterError, ParameterSet, integer, text
+from uam_control.settings.parameter_set import ParameterSet, integer, text
 from uam_lab.cockpit import web
 from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
@@ -19,7 +18,7 @@ from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
 from uam_lab.cockpit.web import PlainPage
 from uam_msgs_py.node.answering import ServingExecutor
-from uam_msgs_py.node.base_node import REFUSED, StopSignal, begin, refuse
+from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.rightful import rightful_nodes
 
@@ -94,20 +93,23 @@ class CockpitParameters(ParameterSet):
 def main() -> int:
     """Serve the page until SIGINT or SIGTERM; return the exit status."""
     stop = StopSignal()
-    node = begin(NAME)
-    if node is None:
-        return REFUSED
+    status = run_with(NAME, lambda node: _serve(node, stop))
+    stop.ignore()
+    return status
+
+
+def _serve(node: Node, stop: StopSignal) -> int:
     options = yaml_file.read(configuration.path(OPTIONS), configuration.ConfigurationError)
+    served = NodeParameters(node, CockpitParameters, read_only=True).current
+    vehicle = described_vehicle(node)
+    rightful = rightful_nodes(node)
+    refuse_unknown(node)
+    origins = [one for one in served.origins.split(",") if one]
+    todo = queue.SimpleQueue()
+    plain = PlainPage(todo.put, served.results)
     try:
-        served = NodeParameters(node, CockpitParameters, read_only=True).current
-        vehicle = described_vehicle(node)
-        rightful = rightful_nodes(node)
-        refuse_unknown(node)
-        origins = [one for one in served.origins.split(",") if one]
-        todo = queue.SimpleQueue()
-        plain = PlainPage(todo.put, served.results)
         server = web.serve(served.host, served.port, "uam", plain, origins)
-    except (ParameterError, AddressError) as error:
+    except AddressError as error:
         return refuse(NAME, error)
     print(f"{NAME}: {web.url(server)}", flush=True)
     executor = ServingExecutor()
@@ -136,7 +138,4 @@ def main() -> int:
         time.sleep(ASKED_WITHIN)
     server.stop()
     watcher.destroy_node()
-    node.destroy_node()
-    rclpy.try_shutdown()
-    stop.ignore()
     return 0

@@ -68,11 +68,12 @@ class Cables:
         self.poses_come = not on
 
     def _mocap_occluded(self, fault: CableFault, on: bool) -> None:
-        self._lab.mocap.occlude(self._lab.devices.body, on)
+        self._lab.mocap.occlude(self._lab.parameters.body, on)
         self.poses_come = not on
 
     def _mocap_renamed(self, fault: CableFault, on: bool) -> None:
-        names = self._lab.devices.body, f"{self._lab.devices.body}_2"
+        body = self._lab.parameters.body
+        names = body, f"{body}_2"
         self._lab.mocap.rename(*(names if on else names[::-1]))
         self.poses_come = not on
 

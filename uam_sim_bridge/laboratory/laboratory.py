@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 
@@ -33,12 +32,13 @@ from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, Moc
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.laboratory.hil_line import HilLine
+from uam_sim_bridge.laboratory.laboratory_parameters import LINE, LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Grip, joint_torque, wrench
 from uam_sim_bridge.laboratory.tracked_room import RoomBody
 from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain, mistaken_room
 from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.plant import Samples, Truth, Vehicle, warm_up
-from uam_sim_bridge.plant.engines import plant_class
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, plant_class
 
 ADAPTER_LATENCY = 0.001  # [s] latency timer of the servo bus's adapter
 OWN_DELAYS = {  # those that the emulated devices have
@@ -49,31 +49,6 @@ OWN_DELAYS = {  # those that the emulated devices have
 CONTROLS_OF_ACTUATORS = 6  # the last ones of HIL_ACTUATOR_CONTROLS
 # in the folder; USB: sensors and motors of an autopilot in HITL
 BUS_DEVICE, SERIAL_NEAR, SERIAL_FAR, USB = "ttyARM", "ttyTELEM2", "ttyAUTOPILOT", "ttyUSB"
-
-
-@dataclass(frozen=True)
-class Devices:
-    """The devices of a lab file, as emulated.
-
-    folder: of the pseudo-terminals; chain: servos as described; baud: of the autopilot's line;
-    body, payload: rigid bodies, payload "" for none; mocap_port: command port; magnet_line: file of
-    the GPIO line, None where the autopilot switches; magnet_output: actuator 1..6; magnet_on,
-    magnet_off: its values; usb: sensors and motors go over a line, not over TCP.
-    """
-
-    folder: Path
-    chain: ArmChain
-    baud: int
-    body: str
-    payload: str
-    calibration: Calibration
-    mocap_port: int
-    magnet_line: Path | None
-    active_low: bool = False
-    magnet_output: int = 1
-    magnet_on: float = 1.0
-    magnet_off: float = -1.0
-    usb: bool = False
 
 
 class Laboratory:
@@ -87,29 +62,31 @@ class Laboratory:
     def __init__(
         self,
         vehicle: Vehicle,
-        devices: Devices,
-        hil_port: int,
-        payload_mass: float,
-        seed: int,
-        arm_start: Sequence[float] = (),
+        parameters: LaboratoryParameters,
+        chain: ArmChain,
+        calibration: Calibration,
         wiring: Schedule | None = None,
-        plant: str = "mujoco",
     ) -> None:
-        """wiring: mistakes of the set-up. Raises OSError (port in use), PlantError, FaultError."""
+        """chain: servos as described; calibration: of the cameras; wiring: mistakes of the set-up.
+
+        Raises OSError (port in use), FaultError.
+        """
         latency = vehicle.numbers["sensors"]["mocap"]["latency_ticks"]
         vehicle = vehicle.changed(OWN_DELAYS)
         self.description: VehicleDescription = vehicle.description
-        start = tuple(arm_start)
-        self.plant = plant_class(plant)(vehicle, payload_mass, seed, start)
-        warm_up(plant_class(plant)(vehicle, payload_mass, seed, start))
-        self.devices = devices
+        p, self.chain, self.calibration = parameters, chain, calibration
+        start = tuple(p.arm_start)
+        plant = partial(plant_class(DEFAULT_PLANT), vehicle, p.payload_mass, p.seed, start)
+        self.plant = plant()
+        warm_up(plant())
+        self.parameters = p
         self.wiring = wiring or Schedule()
         self.grip = Grip()
         self.folded = np.array(start or vehicle.description.stowed, dtype=float)
         self._driven = False  # whether the servos have had a command
         self._weight = vehicle.numbers["mass"] * vehicle.numbers["gravity"]
         self._in_position_mode = vehicle.numbers["servos"]["mode"] == POSITION_SERVO
-        chain, mounted = devices.chain, mistaken_chain(devices.chain, self.wiring)
+        mounted = mistaken_chain(chain, self.wiring)
         joints = len(chain.arm)
         self.shafts, self._fingers = ArmShafts(mounted[:joints]), ArmShafts(mounted[joints:])
         self._hand = np.zeros(joints)  # (n,) [N m] of the person on the joints
@@ -121,33 +98,32 @@ class Laboratory:
             self.servos,
             timing=True,
             latency_timer=ADAPTER_LATENCY,
-            seed=seed,
-            link=devices.folder / BUS_DEVICE,
+            seed=p.seed,
+            link=p.places / BUS_DEVICE,
         )
-        near, far = devices.folder / SERIAL_NEAR, devices.folder / SERIAL_FAR
-        self.cable = SerialCable(near, far, devices.baud, seed)
+        self.cable = SerialCable(p.places / SERIAL_NEAR, p.places / SERIAL_FAR, p.baud, p.seed)
         self.mocap = MocapServer(
             mistaken_room(self._bodies(), self.wiring),
             # the plant's own rate decides
-            streaming=Streaming(rate=1.0 / self.plant.period, port=devices.mocap_port),
+            streaming=Streaming(rate=1.0 / self.plant.period, port=p.mocap_port),
             disturbances=Disturbances(latency=max(0.0005, latency * self.plant.period)),
-            seed=seed,
+            seed=p.seed,
         )
         rotors = len(self.description.rotors)
-        if devices.usb:
-            self.hil: HilServer | HilLine = HilLine(devices.folder / USB, rotors, seed)
+        if p.hil == LINE:
+            self.hil: HilServer | HilLine = HilLine(p.places / USB, rotors, p.seed)
         else:
-            self.hil = HilServer(hil_port, rotors, seed=seed)
+            self.hil = HilServer(p.hil_port, rotors, seed=p.seed)
         self.hil_plugged = self.magnet_plugged = True
         self.magnet = False
         self.mocap.start()
 
     def _bodies(self) -> list[RoomBody]:
         """Return the bodies in the order of the server's list: vehicle, payload."""
-        d = self.devices
-        found = [RoomBody(d.body, d.calibration)]
-        if d.payload:
-            found.append(RoomBody(d.payload, d.calibration.without_body()))
+        p, calibration = self.parameters, self.calibration
+        found = [RoomBody(p.body, calibration)]
+        if p.payload:
+            found.append(RoomBody(p.payload, calibration.without_body()))
         return found
 
     def sense(self, host: float) -> tuple[Samples, Truth]:
@@ -155,11 +131,10 @@ class Laboratory:
         samples, truth = self.plant.sense(), self.plant.truth()
         self._turn_shafts(truth)
         if samples.mocap is not None:
-            d = self.devices
-            exposed = host + samples.mocap[0] - self.plant.time
-            poses = {d.body: samples.mocap[1:]}
-            if d.payload and samples.payload is not None:
-                poses[d.payload] = samples.payload[1:]
+            p, exposed = self.parameters, host + samples.mocap[0] - self.plant.time
+            poses = {p.body: samples.mocap[1:]}
+            if p.payload and samples.payload is not None:
+                poses[p.payload] = samples.payload[1:]
             self.mocap.expose(exposed, poses)
         return samples, truth
 
@@ -197,7 +172,7 @@ class Laboratory:
         """Give the gripper's servo its state, and the fingers the goal of the servo."""
         if not self._fingers.shafts:
             return
-        lever, (closed, opened) = self.devices.chain.transmission, self.description.gripper.opening
+        lever, (closed, opened) = self.chain.transmission, self.description.gripper.opening
         opening, force = truth.grip
         self._fingers.set(*(np.array([one]) for one in (opening / lever, 0.0, -force * lever)))
         goal = self._fingers.command(True).item() * lever
@@ -214,18 +189,17 @@ class Laboratory:
         """Return whether current flows through the magnet."""
         if not self.magnet_plugged:
             return False
-        d = self.devices
-        line = d.magnet_line
+        p, line = self.parameters, self.parameters.gpio
         if line is None:
             first = len(self.hil.controls) - CONTROLS_OF_ACTUATORS
-            value = self.hil.controls[first + d.magnet_output - 1]
-            return bool(abs(value - d.magnet_on) < abs(value - d.magnet_off))
+            value = self.hil.controls[first + p.magnet_output - 1]
+            return bool(abs(value - p.magnet_on) < abs(value - p.magnet_off))
         try:
             level = line.read_text(encoding="utf-8") == "1"
         except OSError:
             return False
         inverted = any(one.fault.NAME == "magnet_inverted" for one in self.wiring.faults)
-        return (level is not d.active_low) is not inverted
+        return (level is not p.active_low) is not inverted
 
     def close(self) -> None:
         """Close every device."""

@@ -36,13 +36,15 @@ from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
+from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
+from uam_sim_bridge.devices.mocap.calibration import load
 from uam_sim_bridge.faults import CABLE, Schedule
 from uam_sim_bridge.laboratory.cables import Cables
 from uam_sim_bridge.laboratory.laboratory import Laboratory
+from uam_sim_bridge.laboratory.laboratory_parameters import TOPIC, LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
-from uam_sim_bridge.nodes import plant_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.nodes.plant_options import TOPIC, LaboratoryParameters
+from uam_sim_bridge.nodes.plant_options import declare_laboratory
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
@@ -123,17 +125,9 @@ class Rehearsal:
         self._node, self._p, self._stop = node, p, stop
         numbers = Vehicle.of(vehicle).changed(p.changes())
         faults = Schedule.from_text(p.faults).only(CABLE)
-        folder = Path(p.folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        self.lab = Laboratory(
-            numbers,
-            plant_options.devices(vehicle, p),
-            p.hil_port,
-            p.payload_mass,
-            p.seed,
-            p.arm_start,
-            faults,
-        )
+        p.places.mkdir(parents=True, exist_ok=True)
+        chain, cameras = load_chain(hardware_file(p.hardware), vehicle), load(p.calibration)
+        self.lab = Laboratory(numbers, p, chain, cameras, faults)
         self.statistics = Statistics()
         self._cables = Cables(self.lab, faults)
         self._changed = self._cables.update(0.0)  # faults at the start; published later
@@ -155,7 +149,7 @@ class Rehearsal:
         self._mission = MissionStatus()
         self._person = Person(vehicle.joint_names, self.lab.folded)
         self._list, self._asked = ChecklistState(), -math.inf
-        (folder / READY).write_text(f"{self.lab.mocap.port}\n", encoding="utf-8")
+        (p.places / READY).write_text(f"{self.lab.mocap.port}\n", encoding="utf-8")
 
     def await_autopilot(self) -> None:
         """Wait until the autopilot is connected, or a signal."""
@@ -273,7 +267,7 @@ def main() -> int:
 
 
 def _rehearse(node: TunableNode, stop: StopSignal) -> int:
-    vehicle, parameters = plant_options.declare_laboratory(node)
+    vehicle, parameters = declare_laboratory(node)
     refuse_unknown(node)
     try:
         rehearsal = Rehearsal(node, vehicle, parameters, stop)

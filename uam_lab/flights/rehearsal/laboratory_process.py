@@ -24,8 +24,8 @@ from uam_lab.records.results.atomic import write_text
 from uam_sim_bridge.devices.mocap.calibration import FOLDER as CALIBRATIONS
 from uam_sim_bridge.faults import CABLE
 from uam_sim_bridge.laboratory.laboratory import BUS_DEVICE, SERIAL_FAR, SERIAL_NEAR, USB
+from uam_sim_bridge.laboratory.laboratory_parameters import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.mavlink.transport.transport import parse_url
-from uam_sim_bridge.nodes.plant_options import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.ports import Ports
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.hitl import gripper_parameter
