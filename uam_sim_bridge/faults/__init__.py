@@ -3,16 +3,3 @@
 from uam_sim_bridge.faults.fault import CABLE, LINK, PLANT, PROCESS, Fault, FaultError
 from uam_sim_bridge.faults.fault_catalogue import FAULTS
 from uam_sim_bridge.faults.schedule import Schedule, TimedFault, read_schedule
-
-__all__ = [
-    "CABLE",
-    "FAULTS",
-    "LINK",
-    "PLANT",
-    "PROCESS",
-    "Fault",
-    "FaultError",
-    "Schedule",
-    "TimedFault",
-    "read_schedule",
-]

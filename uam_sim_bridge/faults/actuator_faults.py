@@ -99,15 +99,3 @@ class WindGust(PhysicsFault):
         angle = math.radians(self.towards)
         full = np.array([self.speed * math.cos(angle), self.speed * math.sin(angle), self.up])
         physics.wind += 0.5 * (1.0 - math.cos(math.pi * now.done(self.rise))) * full
-
-
-FAULTS = (
-    ServoWeak,
-    ServoJam,
-    MagnetWeak,
-    MagnetStuck,
-    PayloadSwing,
-    MotorLoss,
-    BatterySag,
-    WindGust,
-)

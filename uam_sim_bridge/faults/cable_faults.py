@@ -134,28 +134,3 @@ class MagnetInverted(CableFault):
     """The magnet is switched by the other level: on when it should be off."""
 
     WIRING: ClassVar[bool] = True
-
-
-FAULTS = (
-    BusUnplugged,
-    ServoUnplugged,
-    BusBitErrors,
-    ServoOverheating,
-    ServoOverload,
-    MocapUnplugged,
-    MocapOccluded,
-    MocapRenamed,
-    MocapAxes,
-    MocapTurned,
-    SerialUnplugged,
-    SerialCut,
-    SerialBitErrors,
-    MagnetUnplugged,
-    ImuUnplugged,
-    HilUnplugged,
-    WrongId,
-    JointsSwapped,
-    DirectionReversed,
-    ZeroShifted,
-    MagnetInverted,
-)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError
 from uam_control.settings.texts import unknown
 from uam_sim_bridge.faults import (
@@ -18,7 +20,16 @@ KINDS = (
     *(mocap_faults, imu_faults, actuator_faults, link_faults, process_faults),
     cable_faults,
 )
-FAULTS: dict[str, type[Fault]] = {kind.NAME: kind for module in KINDS for kind in module.FAULTS}
+
+
+def _faults(module: ModuleType) -> list[type[Fault]]:
+    """Return the faults of a module: its classes on which no other is based, in order."""
+    found = [one for one in vars(module).values() if isinstance(one, type)]
+    own = [one for one in found if issubclass(one, Fault) and one.__module__ == module.__name__]
+    return [kind for kind in own if not kind.__subclasses__()]
+
+
+FAULTS: dict[str, type[Fault]] = {kind.NAME: kind for one in KINDS for kind in _faults(one)}
 WHOLE = ("joint", "motor", "other", "id")  # parameters that must be whole numbers
 
 

@@ -105,6 +105,3 @@ class EncoderStuck(PlantFault):
         alpha, alpha_dot = alpha.copy(), alpha_dot.copy()
         alpha[joint], alpha_dot[joint] = now.memory, 0.0
         samples.joints = stamp, alpha, alpha_dot, torque
-
-
-FAULTS = (ImuBias, ImuSaturation, ImuDropout, ImuStamps, EncoderStuck)

@@ -49,6 +49,3 @@ class MavlinkCorruption(LinkFault):
     """Some packets have one wrong byte, and the receiver discards them."""
 
     share: float = number(0.2, "fraction of wrong packets", "1", 0.0, 1.0)
-
-
-FAULTS = (MavlinkCut, MavlinkDelay, MavlinkCorruption)

@@ -118,14 +118,3 @@ class ClockJump(PoseFault):
     def altered(self, pose: Pose, now: Occurrence) -> Pose | None:
         stamp = pose[0] + self.step
         return (stamp, *pose[1:]) if stamp >= 0.0 else None  # no message has a stamp below zero
-
-
-FAULTS = (
-    MocapDropout,
-    MocapFreeze,
-    MocapJump,
-    MocapSwap,
-    MocapLatency,
-    MocapOutliers,
-    ClockJump,
-)

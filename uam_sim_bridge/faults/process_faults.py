@@ -37,13 +37,6 @@ class NodeStall(ProcessFault):
     """A process is stopped (SIGSTOP) and continues when the fault ends."""
 
 
-class DiscoveryLoss(ProcessFault):
-    """A process neither sends nor receives DDS discovery data; its connections last until its
-    lease at the other processes expires."""
-
-    node: str = choice("arm_controller", NODE, tuple(one for one in NODES if one != "autopilot"))
-
-
 class NodeSlow(ProcessFault):
     """A process is stopped for a fraction of each cycle, as on a busy computer."""
 
@@ -51,4 +44,8 @@ class NodeSlow(ProcessFault):
     cycle: float = number(0.02, "length of a cycle", "s", 0.005, 1.0)
 
 
-FAULTS = (NodeKill, NodeStall, NodeSlow, DiscoveryLoss)
+class DiscoveryLoss(ProcessFault):
+    """A process neither sends nor receives DDS discovery data; its connections last until its
+    lease at the other processes expires."""
+
+    node: str = choice("arm_controller", NODE, tuple(one for one in NODES if one != "autopilot"))

@@ -10,8 +10,3 @@ from uam_sim_bridge.plant.plant import (
     warm_up,
 )
 from uam_sim_bridge.plant.vehicle import Vehicle
-
-__all__ = [
-    *("Disturbance", "PhysicsError", "Plant", "Samples", "Truth", "TruthRow", "Vehicle"),
-    "warm_up",
-]
