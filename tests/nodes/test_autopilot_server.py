@@ -215,7 +215,7 @@ def test_signed_flight_and_no_answer_to_others(start):
     key = "ab" * 32
     f = Flight(start, Signing.from_text(key), ("--signing-key", key))
     f.airborne()
-    assert f.link.refused == 0
+    assert f.link.codec.refused == 0
     other = f.link._codec
     f.link._codec = Codec(1, 191)  # no signature: the stream ends for the autopilot
     f.run(1.3, thrust=HOVER / 41.36)

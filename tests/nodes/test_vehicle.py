@@ -17,11 +17,12 @@ import yaml
 from arm_rig import BAUD, STOWED
 from autopilot_on_a_line import AutopilotOnALine
 from servo_shafts import StillShaft
+from tracked_vehicle import TrackedBody
 
 from uam_lab.flights.processes.process_table import nodes
 from uam_lab.flights.vehicle.lab_file import template
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming, TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
 
 PATIENCE = 120.0  # [s]
 PLACE = np.array([0.0, 0.0, 0.2])

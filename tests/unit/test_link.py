@@ -121,8 +121,8 @@ def test_set_up(rig):
     assert streams == [*(number for number in RATES if number not in ONLY_COUNTED), *ON_CHANGE]
     read = [clean_text(m.param_id) for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"]
     assert sorted(read) == sorted(FIRMWARES["px4"].watched)
-    assert link.mapping_read and link.warnings == ()
-    assert link.lost == link.bad_bytes == 0 and link.statistics.rate > 30.0
+    assert link.parameters.mapping_read and link.warnings == ()
+    assert link.lost == link.framer.bad_bytes == 0 and link.statistics.rate > 30.0
 
 
 def test_an_autopilot_of_another_system_is_named(rig):
@@ -314,7 +314,9 @@ def test_reboot_on_the_ground_repeats_all_requests(rig):
     assert rig.link.reboots == 1 and rig.sequence.phase is Phase.STREAMING
     intervals = [c for c, _ in rig.commands() if c == MavCmd.SET_MESSAGE_INTERVAL]
     assert len(intervals) == len(RATES) - len(ONLY_COUNTED) + len(ON_CHANGE)
-    assert rig.link.mapping_read and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
+    assert rig.link.parameters.mapping_read and rig.link.time_sync.offset == pytest.approx(
+        -8.0, abs=0.01
+    )
     rig.sequence.set_desired(True)
     rig.run(2.0)
     assert rig.sequence.phase is Phase.FLYING and rig.link.reboots == 1
@@ -374,7 +376,7 @@ def test_a_parameter_that_never_arrives_is_a_warning(rig):
     assert "THR_MDL_FAC: no answer from the autopilot to 10 requests" in rig.link.warnings
     requests = len([m for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"])
     rig.run(5.0)
-    assert requests == 0 and not rig.link.mapping_read
+    assert requests == 0 and not rig.link.parameters.mapping_read
 
 
 def test_differences_and_a_short_loss_time_are_warnings():

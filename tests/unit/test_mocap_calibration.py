@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracked_vehicle import RATE, STANDING, ahead, moving, recorded, standing
+from tracked_vehicle import RATE, STANDING, TrackedBody, ahead, moving, recorded, standing
 
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
@@ -19,7 +19,7 @@ from uam_lab.cli.main import main
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap import measurement
 from uam_sim_bridge.devices.mocap.calibration import fit
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.devices.mocap.measurement import angle_between, places, still
 from uam_sim_bridge.plant import Vehicle

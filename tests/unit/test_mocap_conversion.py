@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tracked_vehicle import TrackedBody
 
 from uam_control.maths.rotations import (
     euler_from_quaternion,
@@ -16,7 +17,6 @@ from uam_control.maths.rotations import (
 from uam_control.settings.configuration import ConfigurationError
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap.calibration import Calibration, conjugate, world_rotation
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import TrackedBody
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 
 HALF = math.sqrt(0.5)

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from natnet.version import Version
+from tracked_vehicle import TrackedBody
 
 from uam_sim_bridge.devices.mocap.calibration import load
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, TrackedBody
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 from uam_sim_bridge.devices.mocap.natnet_messages import UNREADABLE, read_frame, read_models
 from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource

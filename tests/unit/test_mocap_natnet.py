@@ -16,6 +16,7 @@ from natnet.data_descriptions import DataDescriptions
 from natnet.data_frame import DataFrame
 from natnet.packet_buffer import PacketBuffer
 from natnet.version import Version
+from tracked_vehicle import TrackedBody
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_sim_bridge.devices.mocap import calibration as calibrations
@@ -27,7 +28,6 @@ from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
     Disturbances,
     MocapServer,
     Streaming,
-    TrackedBody,
 )
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 from uam_sim_bridge.devices.mocap.library_source import LibrarySource

@@ -184,7 +184,7 @@ def test_a_full_tcp_link_drops_whole_frames(opened):
     peer, _ = server.accept()
     opened.append(peer)
     until(lambda: (link.receive(), link.connected)[1], "the connection")
-    link._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    link._opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     codec, sent = Codec(1, 1), []
     for k in range(200_000):
         if link.send(codec.encode(sample(k))):

@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.ages import age_by
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
 from uam_control.offboard.modes import MavCmd, MavResult, Severity
-from uam_control.setpoints.targets import AttitudeTarget
+from uam_control.setpoints.targets import AttitudeTarget, Target
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -82,22 +82,20 @@ class Companion:
             self._autopilot.commander.texts.append((Severity.WARNING, text))
 
     def _attitude_target(self, time: float, m: Message) -> None:
-        refused = self._autopilot.target(time, attitude_target(m))
-        if refused:
-            self._say_once(f"setpoint refused: {refused}")
+        self._target(time, attitude_target(m))
 
     def _position_target(self, time: float, m: Message) -> None:
-        refused = f"frame {m.coordinate_frame}, local NED expected"
-        if m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED:
-            refused = self._autopilot.target(time, position_target(m))
-        if refused:
-            self._say_once(f"setpoint refused: {refused}")
+        local = m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED
+        wrong = "" if local else f"frame {m.coordinate_frame}, local NED expected"
+        self._target(time, position_target(m), wrong)
 
     def _wrench_target(self, time: float, m: Message) -> None:
-        refused = f"group {m.group_mlx}, {GROUP} expected"
-        if m.group_mlx == GROUP:
-            refused = self._autopilot.target(time, wrench_target(m))
-        if refused:
+        wrong = "" if m.group_mlx == GROUP else f"group {m.group_mlx}, {GROUP} expected"
+        self._target(time, wrench_target(m), wrong)
+
+    def _target(self, time: float, target: Target, wrong: str = "") -> None:
+        """Pass a setpoint on; wrong: why not, "" for nothing."""
+        if refused := wrong or self._autopilot.target(time, target):
             self._say_once(f"setpoint refused: {refused}")
 
     def _vision_position(self, time: float, m: Message) -> None:

@@ -260,7 +260,8 @@ class Autopilot:
                 attitude_rates(
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
-        self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
+        landed = landing.maybe_landed
+        self._control_tick(gyro, dt, commander.armed, landed, setpoint, self._loop)
         if self._flew_rates and commander.armed:
             if self._torque is not None:
                 self.allocate(self._torque, setpoint[3])
@@ -280,7 +281,7 @@ class Autopilot:
 
         gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust 0..1.
         """
-        self._cycle(gyro, dt, True, False, setpoint)
+        self._control_tick(gyro, dt, True, False, setpoint, self._loop)
         return self.motors
 
     def allocate(self, torque: np.ndarray, thrust: float) -> np.ndarray:
@@ -291,11 +292,6 @@ class Autopilot:
         self._memory[TORQUE], self._memory[INTEGRAL] = torque, 0.0
         drive_motors(thrust, self._loop)
         return self.motors
-
-    def _cycle(
-        self, gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray
-    ) -> None:
-        self._control_tick(gyro, dt, armed, landed, setpoint, self._loop)
 
     @property
     def settled(self) -> bool:

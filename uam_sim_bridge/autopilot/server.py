@@ -61,13 +61,37 @@ _LATEST = 2**53  # µs, latest time: its nanoseconds still fit MAVLink's 64 bits
 _RATE_SAMPLES = 8  # number of intervals that measure the rate of HIL_SENSOR
 
 
-class SerialLine:
-    """One serial line; its loss ends the server, like a closed connection to the simulator."""
+class CompanionLine:
+    """A serial line to the companion alone, as TELEM2; in the place of the UDP port in `Server`.
+
+    It outlives the loss of the line: the device is opened again.
+    """
 
     def __init__(self, place: str, codec: Codec) -> None:
         """place: DEVICE:BAUD. Raises PortError in one line if it cannot be opened."""
         self._transport: SerialTransport = open_transport(f"serial:{place}")
-        self._codec = codec
+        self._codec, self._framer = codec, Framer(codec)
+
+    def receive(self) -> list[Message]:
+        """Return all received messages."""
+        chunks = self._transport.receive()
+        return [message for data in chunks for message in self._framer.stream(data)]
+
+    def send(self, messages: list[Message]) -> None:
+        """Send the messages; those that the line's buffer has no room for are lost."""
+        for message in messages:
+            self._transport.send(self._codec.encode(message))
+
+    def close(self) -> None:
+        """Close the device."""
+        self._transport.close()
+
+
+class SerialLine(CompanionLine):
+    """One serial line; its loss ends the server, like a closed connection to the simulator."""
+
+    def __init__(self, place: str, codec: Codec) -> None:
+        super().__init__(place, codec)
         self._chunks: list[bytes] = []
 
     def recv(self, size: int) -> bytes:
@@ -86,41 +110,6 @@ class SerialLine:
     def receive(self) -> list[Message]:
         """Return no messages: those of the companion arrive through `recv`."""
         return []
-
-    def send(self, messages: list[Message]) -> None:
-        """Send the messages to the companion."""
-        for message in messages:
-            self.sendall(self._codec.encode(message))
-
-    def close(self) -> None:
-        """Close the device."""
-        self._transport.close()
-
-
-class CompanionLine:
-    """A serial line to the companion alone, as TELEM2; in the place of the UDP port in `Server`.
-
-    It outlives the loss of the line: the device is opened again.
-    """
-
-    def __init__(self, place: str, codec: Codec) -> None:
-        """place: DEVICE:BAUD. Raises PortError in one line if it cannot be opened."""
-        self._transport = open_transport(f"serial:{place}")
-        self._codec, self._framer = codec, Framer(codec)
-
-    def receive(self) -> list[Message]:
-        """Return all received messages."""
-        chunks = self._transport.receive()
-        return [message for data in chunks for message in self._framer.stream(data)]
-
-    def send(self, messages: list[Message]) -> None:
-        """Send the messages; those that the line's buffer has no room for are lost."""
-        for message in messages:
-            self._transport.send(self._codec.encode(message))
-
-    def close(self) -> None:
-        """Close the device."""
-        self._transport.close()
 
 
 class OwnClock:

@@ -49,14 +49,8 @@ class PositionControl:
     def configure(self, parameters: Parameters) -> None:
         """Take the gains from the autopilot's parameters."""
         p = self._parameters = parameters
-
-        def gains(xy: str, z: str) -> np.ndarray:
-            return np.array([p[xy], p[xy], p[z]])
-
-        self._position_gain = gains("MPC_XY_P", "MPC_Z_P")
-        self._p = gains("MPC_XY_VEL_P_ACC", "MPC_Z_VEL_P_ACC")
-        self._i = gains("MPC_XY_VEL_I_ACC", "MPC_Z_VEL_I_ACC")
-        self._d = gains("MPC_XY_VEL_D_ACC", "MPC_Z_VEL_D_ACC")
+        self._position_gain = _gains(p, "P")
+        self._p, self._i, self._d = (_gains(p, f"VEL_{kind}_ACC") for kind in "PID")
         self._attitude_gains = attitude_gains(p)
 
     def reset(self) -> None:
@@ -131,6 +125,11 @@ class PositionControl:
         return axis, axis * min(vertical / axis[2], -p["MPC_THR_MIN"])
 
 
+def _gains(p: Parameters, name: str) -> np.ndarray:
+    """Return a gain (3,) that is the same for both horizontal axes."""
+    return np.array(p.vector(f"MPC_XY_{name}", f"MPC_XY_{name}", f"MPC_Z_{name}"))
+
+
 def limit_across(first: np.ndarray, second: np.ndarray, most: float, total: np.ndarray) -> None:
     """Write first + second, horizontally at most `most` [m/s], to total (3,); first has priority.
 
@@ -180,12 +179,8 @@ class PositionModes:
     def configure(self, parameters: Parameters) -> None:
         """Take the gains from the autopilot's parameters."""
         p = self._parameters = parameters
-        xy, z = p["MPC_XY_P"], p["MPC_Z_P"]
-        self._position_gain = np.array([xy, xy, z])
-        xy, z = p["MPC_XY_VEL_P_ACC"], p["MPC_Z_VEL_P_ACC"]
-        self._velocity_gain = np.array([xy, xy, z])
-        xy, z = p["MPC_XY_VEL_I_ACC"], p["MPC_Z_VEL_I_ACC"]
-        self._integral_gain = np.array([xy, xy, z])
+        self._position_gain = _gains(p, "P")
+        self._velocity_gain, self._integral_gain = (_gains(p, f"VEL_{kind}_ACC") for kind in "PI")
         self._attitude_gains = attitude_gains(p)
 
     def reset(self) -> None:

@@ -59,9 +59,9 @@ class ServoDescription:
     low: float
     high: float
     stowed: float
-    coulomb: float
-    viscous: float
-    torque_scale: float
+    coulomb: float = 0.0
+    viscous: float = 0.0
+    torque_scale: float = 1.0
     mode: int | None = None
     speed: float = 0.0
 
@@ -242,9 +242,6 @@ def _gripper_servo(entry: Section, numbers: dict[str, Any]) -> ServoDescription:
         low=closed,
         high=opened,
         stowed=opened,
-        coulomb=0.0,
-        viscous=0.0,
-        torque_scale=1.0,
         mode=names.CURRENT_POSITION_MODE,
         speed=numbers["speed"] / lever,
     )

@@ -111,18 +111,15 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
     return link
 
 
-def port(text: str) -> int:
-    """Return a port number; an argparse type."""
-    if not text.isdecimal() or not 1 <= int(text) <= 65535:
-        raise argparse.ArgumentTypeError(f"{text} is not a port (1..65535)")
-    return int(text)
+def whole(what: str, low: int, high: int) -> Callable[[str], int]:
+    """Return an argparse type: an integer from `low` to `high`; what: its name in errors."""
 
+    def read(text: str) -> int:
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not {what} ({low}..{high})")
+        return int(text)
 
-def instance(text: str) -> int:
-    """Return a PX4 instance number; an argparse type."""
-    if not text.isdecimal() or int(text) > 254:
-        raise argparse.ArgumentTypeError(f"{text} is not an instance number (0..254)")
-    return int(text)
+    return read
 
 
 def number(what: str, low: float, high: float) -> Callable[[str], float]:
@@ -164,7 +161,8 @@ class Program(argparse.ArgumentParser):
     def instance(self) -> None:
         """Add the option of the instance number."""
         text = "PX4 instance number, added to the default ports (default %(default)s)"
-        self.add_argument("-i", "--instance", type=instance, default=0, metavar="N", help=text)
+        kind = whole("an instance number", 0, 254)
+        self.add_argument("-i", "--instance", type=kind, default=0, metavar="N", help=text)
 
     def vehicle(self) -> None:
         """Add the option of the vehicle."""
@@ -174,6 +172,7 @@ class Program(argparse.ArgumentParser):
     def ports(self) -> None:
         """Add the options of instance, simulator and companion ports."""
         self.instance()
+        port = whole("a port", 1, 65535)
         self.option("--sim-host", "HOST", "simulator", HOST)
         self.option("--sim-port", "PORT", "simulator (default 4560 + N)", type=port)
         self.option("--mavlink-port", "PORT", "own UDP port (default 14580 + N)", type=port)

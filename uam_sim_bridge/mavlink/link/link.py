@@ -57,6 +57,7 @@ class OffboardLink(FlightState):
     or for other receivers; `vitals`: battery, estimator and sensors; `reboots`: number of restarts;
     `foreign`: system ids of other autopilots whose heartbeats have come;
     `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
+    `alive`: connected at the last `maintain`; `transport`, `codec`, `framer`: of the messages.
     """
 
     def __init__(
@@ -90,26 +91,22 @@ class OffboardLink(FlightState):
         self._events = EventReader(spoken)
         self.parameters = ParameterWatch(mapping, required, spoken)
         self.values = self.parameters.values
-        self._transport = transport
+        self.transport = transport
         self._target = target_system
-        self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
-        self._framer = Framer(self._codec)
+        self.codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
+        self.framer = Framer(self.codec)
         self._texts = TextAssembler()
         self._pending: dict[int, Request] = {}
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
         self._heard = -math.inf  # [s] newest message
-        self._was_connected = False  # at the last tick
+        self.alive = False
         self._told_unsigned = False
-
-    def set_mapping(self, mapping: RateThrustParameters) -> None:
-        """Compare the autopilot's parameters with this mapping from now on."""
-        self.parameters.set_mapping(mapping)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return one line per problem with the autopilot's parameters and streams."""
         unsigned = (UNSIGNED,) if self._unsigned else ()
-        foreign = (self._foreign,) if self.foreign and not self._was_connected else ()
+        foreign = (self._foreign,) if self.foreign and not self.alive else ()
         return unsigned + foreign + self.parameters.warnings + self.streams.warnings
 
     @property
@@ -123,37 +120,12 @@ class OffboardLink(FlightState):
     @property
     def _unsigned(self) -> bool:
         """Whether the autopilot sends only unsigned messages, which this link refuses."""
-        return self._codec.unsigned is not None and self._heartbeat_in == -math.inf
-
-    @property
-    def mapping_read(self) -> bool:
-        """Return whether every parameter that the mapping assumes has been received."""
-        return self.parameters.mapping_read
-
-    @property
-    def bad_bytes(self) -> int:
-        """Return the number of bytes outside valid messages."""
-        return self._framer.bad_bytes
+        return self.codec.unsigned is not None and self._heartbeat_in == -math.inf
 
     @property
     def lost(self) -> int:
         """Return the number of lost messages, from gaps in the sequence numbers."""
-        return self.statistics.lost(self._framer.unread)
-
-    @property
-    def refused(self) -> int:
-        """Return the number of messages with a missing or invalid signature."""
-        return self._codec.refused
-
-    @property
-    def open(self) -> bool:
-        """Return whether the local end of the transport is open."""
-        return self._transport.connected
-
-    @property
-    def dropped(self) -> int:
-        """Return the number of frames that the transport did not send."""
-        return self._transport.dropped
+        return self.statistics.lost(self.framer.unread)
 
     @property
     def loss_time(self) -> float:
@@ -173,15 +145,10 @@ class OffboardLink(FlightState):
         """See `AutopilotPort`."""
         return self.loss_time < time - self._heard < math.inf
 
-    @property
-    def alive(self) -> bool:
-        """Whether the autopilot was connected at the last `maintain`."""
-        return self._was_connected
-
     def poll(self, time: float) -> None:
         """Process all received messages at the tick `time` [s]."""
-        for data in self._transport.receive():
-            for message in self._framer.take(data, self._transport.stream):
+        for data in self.transport.receive():
+            for message in self.framer.take(data, self.transport.stream):
                 if message.get_srcSystem() != self._target or not self._for_us(message):
                     self.ignored += 1
                     self._note_foreign(message)
@@ -207,9 +174,9 @@ class OffboardLink(FlightState):
                 )
             )
         connected = self.connected(time)
-        if connected and not self._was_connected:
+        if connected and not self.alive:
             self._restart_requests()
-        self._was_connected = connected
+        self.alive = connected
         if connected:
             self._request_telemetry(time)
         return connected
@@ -258,7 +225,7 @@ class OffboardLink(FlightState):
 
     def close(self) -> None:
         """Close the transport."""
-        self._transport.close()
+        self.transport.close()
 
     def _note_foreign(self, m: Message) -> None:
         if m.get_type() == "HEARTBEAT" and m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
@@ -271,7 +238,7 @@ class OffboardLink(FlightState):
         ) in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
 
     def _send(self, message: Message) -> None:
-        self._transport.send(self._codec.encode(message))
+        self.transport.send(self.codec.encode(message))
 
     def _handle(self, time: float, m: Message) -> None:
         kind = m.get_type()

@@ -15,7 +15,7 @@ def report(link: OffboardLink) -> dict[str, str | int | None]:
         "clock offset [ms]": _scaled(sync.offset, 1e3, ".1f"),
         "messages [1/s]": f"{link.statistics.rate:.0f}",
         "messages lost": link.lost,
-        "bad bytes": link.bad_bytes,
+        "bad bytes": link.framer.bad_bytes,
         "reboots of the autopilot": link.reboots,
         "estimator": None if flags is None else ", ".join(names(flags, ESTIMATOR_FLAGS)),
         "sensors unhealthy": ", ".join(vitals.unhealthy),

@@ -33,35 +33,25 @@ _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 _RAISED = {"commander_rc_override", "failsafe_rc_override"}  # severity INFO in PX4, WARNING here
 
 
+_ON_THE_WIRE = (
+    *("id", "event_time_boot_ms", "sequence"),
+    *("destination_component", "destination_system", "log_levels", "arguments"),
+)
+
+
 class EventMessage(mavlink2.MAVLink_message):
     """EVENT; `arguments`: up to ARGUMENTS bytes; decoding removes trailing zeros."""
 
     id = 410
     msgname = "EVENT"
-    fieldnames = [
-        "destination_component",
-        "destination_system",
-        "id",
-        "event_time_boot_ms",
-        "sequence",
-        "log_levels",
-        "arguments",
-    ]
-    ordered_fieldnames = [
-        "id",
-        "event_time_boot_ms",
-        "sequence",
-        "destination_component",
-        "destination_system",
-        "log_levels",
-        "arguments",
-    ]
+    ordered_fieldnames = list(_ON_THE_WIRE)
+    orders = [3, 4, 0, 1, 2, 5, 6]
+    fieldnames = [_ON_THE_WIRE[place] for place in (3, 4, 0, 1, 2, 5, 6)]
     fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: dict[str, str] = {}
     fieldenums_by_name: dict[str, str] = {}
     fieldunits_by_name: dict[str, str] = {"event_time_boot_ms": "ms"}
     native_format = bytearray(b"<IIHBBBB")
-    orders = [3, 4, 0, 1, 2, 5, 6]
     lengths = [1, 1, 1, 1, 1, 1, ARGUMENTS]
     array_lengths = [0, 0, 0, 0, 0, 0, ARGUMENTS]
     crc_extra = 160
@@ -92,15 +82,8 @@ class EventMessage(mavlink2.MAVLink_message):
 
     def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
         """Return the frame."""
-        payload = self.unpacker.pack(
-            self.event,
-            self.event_time_boot_ms,
-            self.sequence,
-            self.destination_component,
-            self.destination_system,
-            self.log_levels,
-            self.arguments,
-        )
+        values = (getattr(self, name) for name in _ON_THE_WIRE[1:])
+        payload = self.unpacker.pack(self.event, *values)
         return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
 

@@ -7,6 +7,7 @@ written frame is sent before the next frame, so the receiver never gets half a f
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import select
@@ -33,8 +34,8 @@ class StreamTransport:
     """Base class of TCP and serial links.
 
     `connected`: link is open; `dropped`: frames not sent; `losses`: number of link losses. A
-    subclass implements `_open` (returns whether the link is up, raises OSError on failure),
-    `_read`, `_write`, `_number` and `_shut`.
+    subclass implements `_open` (sets `_opened`, returns whether the link is up, raises OSError on
+    failure), `_read` and `_write`.
     """
 
     stream = True
@@ -46,6 +47,7 @@ class StreamTransport:
         self.dropped = self.losses = 0
         self._clock = clock
         self._rest = b""
+        self._opened: serial.Serial | socket.socket | None = None
         self._delay = FIRST_RETRY
         self._due = -float("inf")
 
@@ -62,7 +64,7 @@ class StreamTransport:
     def receive(self) -> list[bytes]:
         """Return the chunks that have arrived."""
         chunks, left = [], READ_LIMIT
-        while left > 0 and self._ready() and self._flush_some():
+        while left > 0 and self._ready() and (self._flush() or self.connected):
             try:
                 data = self._read()
             except OSError:
@@ -76,7 +78,7 @@ class StreamTransport:
 
     def fileno(self) -> int:
         """Return the descriptor for select, -1 while the link is down."""
-        return self._number() if self.connected else -1
+        return self._opened.fileno() if self.connected else -1
 
     def close(self) -> None:
         """Close permanently."""
@@ -100,10 +102,6 @@ class StreamTransport:
             return False
         if self.connected:
             self._delay, self._rest = FIRST_RETRY, b""
-        return self.connected
-
-    def _flush_some(self) -> bool:
-        self._flush()
         return self.connected
 
     def _flush(self) -> bool:
@@ -138,11 +136,11 @@ class StreamTransport:
     def _write(self, data: bytes) -> int:
         raise NotImplementedError
 
-    def _number(self) -> int:
-        raise NotImplementedError
-
     def _shut(self) -> None:
-        raise NotImplementedError
+        opened, self._opened = self._opened, None
+        if opened is not None:
+            with contextlib.suppress(OSError):  # unplugged
+                opened.close()
 
 
 class SerialTransport(StreamTransport):
@@ -162,7 +160,6 @@ class SerialTransport(StreamTransport):
         super().__init__(clock)
         self._device, self._baud = device, baud
         self.bytes_per_second = baud / BITS_PER_BYTE
-        self._port: serial.Serial | None = None
         try:
             self.connected = self._open(0.0)
         except (OSError, ValueError, OverflowError) as error:
@@ -173,7 +170,7 @@ class SerialTransport(StreamTransport):
 
     def _open(self, now: float) -> bool:
         try:
-            self._port = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
+            self._opened = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
         except termios.error as error:  # unplugged during open; pyserial does not convert it
             raise OSError(*error.args) from None
         return True
@@ -181,26 +178,15 @@ class SerialTransport(StreamTransport):
     def _read(self) -> bytes:
         # An unplugged device is always readable and returns no bytes. Without select, read would
         # not distinguish it from an idle line.
-        if not select.select([self._port.fileno()], [], [], 0.0)[0]:
+        if not select.select([self._opened.fileno()], [], [], 0.0)[0]:
             return b""
-        data = os.read(self._port.fileno(), CHUNK)
+        data = os.read(self._opened.fileno(), CHUNK)
         if not data:
             raise ConnectionResetError
         return data
 
     def _write(self, data: bytes) -> int:
-        return os.write(self._port.fileno(), data)
-
-    def _number(self) -> int:
-        return self._port.fileno()
-
-    def _shut(self) -> None:
-        port, self._port = self._port, None
-        if port is not None:
-            try:
-                port.close()
-            except OSError:  # unplugged
-                pass
+        return os.write(self._opened.fileno(), data)
 
 
 def _reason(error: Exception) -> str:
@@ -221,34 +207,33 @@ class TcpTransport(StreamTransport):
         """remote: host, port. Raises PortError for an unknown host; a closed port is no error."""
         super().__init__(clock)
         self._remote = (resolve(remote[0]), remote[1])  # at start-up: DNS may take seconds
-        self._socket: socket.socket | None = None
         self._until = 0.0
         self._ready()
 
     def _open(self, now: float) -> bool:
-        if self._socket is None:
-            self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-            self._socket.setblocking(False)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_PEER)
+        if self._opened is None:
+            self._opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            self._opened.setblocking(False)
+            self._opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_PEER)
             self._until = now + CONNECT_PATIENCE
-            code = self._socket.connect_ex(self._remote)
+            code = self._opened.connect_ex(self._remote)
             if code not in (0, errno.EINPROGRESS):
                 raise OSError(code, os.strerror(code))
-        if not select.select([], [self._socket], [], 0.0)[1]:
+        if not select.select([], [self._opened], [], 0.0)[1]:
             if now > self._until:
                 raise TimeoutError
             return False
-        code = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        code = self._opened.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if code:
             raise OSError(code, os.strerror(code))
-        if self._socket.getsockname() == self._socket.getpeername():
+        if self._opened.getsockname() == self._opened.getpeername():
             raise ConnectionRefusedError  # no server: on loopback the socket connected to itself
         return True
 
     def _read(self) -> bytes:
         try:
-            data = self._socket.recv(CHUNK)
+            data = self._opened.recv(CHUNK)
         except BlockingIOError:
             return b""
         if not data:
@@ -256,12 +241,4 @@ class TcpTransport(StreamTransport):
         return data
 
     def _write(self, data: bytes) -> int:
-        return self._socket.send(data)
-
-    def _number(self) -> int:
-        return self._socket.fileno()
-
-    def _shut(self) -> None:
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        return self._opened.send(data)

@@ -1,6 +1,6 @@
 """An emulated NatNet server: command and data port, multicast or unicast, and its disturbances.
 
-    with MocapServer([TrackedBody("uam")], poses) as server:
+    with MocapServer([body], poses) as server:
         server.occlude("uam")
 
 `poses(time)` returns name → (position (3,) [m, ENU], quaternion (4,) FLU → ENU) of the vehicle at
@@ -19,56 +19,30 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
-from uam_control.maths.rotations import matrix_from_quaternion, quaternion_multiply
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
 
-# ENU → the tracker's axes, rows: Y up has x, up, and -north
-AXES = {
-    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
-    "z": np.eye(3),
-}
-_TURNS = {"y": np.array([0.5**0.5, -(0.5**0.5), 0.0, 0.0]), "z": np.array([1.0, 0.0, 0.0, 0.0])}
 Poses = Callable[[float], Mapping[str, tuple[np.ndarray, np.ndarray]]]
 GROUP = "239.255.42.99"  # Motive's
 CLIENT_TIME = 10.0  # [s] without a packet after which a client gets no more frames by unicast
 LONGEST_WAIT = 0.02  # [s]
 
 
-@dataclass
-class TrackedBody:
-    """A body of the server.
-
-    up: the tracker's upward axis; made_at (4,) [w x y z]: attitude FLU → ENU of the vehicle when
-    the rigid body was made, along whose axes at that time it lies; pivot (3,) [m, FLU]: its pivot,
-    from base_link.
-    """
+class Body(Protocol):
+    """A rigid body of the server."""
 
     name: str
-    up: str = "y"
-    made_at: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-    pivot: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def seen(
         self, position: np.ndarray, quaternion: np.ndarray
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return position x y z [m] and rotation x y z w in the tracker's axes.
 
-        position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, of base_link. The rotation
-        is that since the body was made, in the tracker's axes.
+        position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, of base_link.
         """
-        marked = position + matrix_from_quaternion(quaternion) @ np.array(self.pivot)
-        turn = _TURNS[self.up]
-        since = quaternion_multiply(quaternion, _inverse(np.array(self.made_at)))
-        turned = quaternion_multiply(quaternion_multiply(turn, since), _inverse(turn))
-        return tuple(AXES[self.up] @ marked), (*turned[1:], turned[0])
-
-
-def _inverse(quaternion: np.ndarray) -> np.ndarray:
-    return quaternion * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 @dataclass
@@ -110,7 +84,7 @@ class MocapServer:
 
     def __init__(
         self,
-        bodies: Sequence[TrackedBody],
+        bodies: Sequence[Body],
         poses: Poses | None = None,
         streaming: Streaming | None = None,
         disturbances: Disturbances | None = None,
