@@ -28,15 +28,6 @@ COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
 
 
-def _unshifted(motion: np.ndarray) -> None:
-    """Leave a motion (5, 6 + n) as it is."""
-
-
-def _nowhere(chi: np.ndarray) -> np.ndarray:
-    """Return no way (3,) [m]: nothing is near."""
-    return np.zeros(3)
-
-
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `retreat` and `descend`.
 
@@ -80,8 +71,9 @@ class Guidance:
         self._due = math.inf  # stamp [s] at which a course of limited time ends, see `Cue`
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
-        self.shift: Callable[[np.ndarray], None] = _unshifted  # of the path, see `Shift.add`
-        self.clear: Callable[[np.ndarray], np.ndarray] = _nowhere  # see `PayloadWatch.clear`
+        # of the path, see `Shift.add` and `PayloadWatch.clear`
+        self.shift: Callable[[np.ndarray], None] = lambda motion: None
+        self.clear: Callable[[np.ndarray], np.ndarray] = lambda chi: np.zeros(3)
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next manoeuvre on."""

@@ -231,7 +231,6 @@ class GoalPose(Goal):
             raise PlanRefused("a coordinate of the goal is not finite")
 
     def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
-        """Return the plan from reference (3, 6 + n) at `stamp` [s]."""
         now = reference[: CHI_DDOT + 1, self.columns].copy()
         blend, needed = Blend(now, 0.0), p.stop_time
         while needed > LONGER * blend.length:  # until the velocity changes gently enough

@@ -144,7 +144,8 @@ class MissionNode(UamNode):
         self.triggers = (topics.STATE.name,)
         offer_commands(self, self._mission)
         self._planners = PlannerInputs(
-            self, self._mission, vehicle.joint_names, self._flyer, self._publish_answer
+            *(self, self._mission, vehicle.joint_names, self._flyer),
+            lambda: self._status.publish(self.status.to_message(self.stamp)),  # a planner waits
         )
 
     def _reference_limits(self, profile: Profile, vehicle: VehicleDescription) -> dict[str, float]:
@@ -320,10 +321,6 @@ class MissionNode(UamNode):
             self._path_of = plan
             stamps, chi = mission.preview(PATH_STEP, PATH_LENGTH)
             self._path.publish(path_message(stamp, np.rint(stamps * SECOND).astype(int), chi))
-
-    def _publish_answer(self) -> None:
-        """Publish the status at once: a planner waits for its answer."""
-        self._status.publish(self.status.to_message(self.stamp))
 
     def _log(self) -> None:
         output = self._mission.output

@@ -42,10 +42,11 @@ class TrackingErrors:
     def __init__(self, node: UamNode) -> None:
         self._ticks: deque[tuple[int, np.ndarray, np.ndarray, bool]] = deque(maxlen=STORED)
         self._commands: deque[tuple[int, bytes | np.ndarray | None]] = deque(maxlen=STORED)
-        node.listen(topics.POSITION_COMMAND, self._on_command, required=False)
-
-    def _on_command(self, data: bytes) -> None:
-        self._commands.append((stamp_of(data), data))
+        node.listen(
+            topics.POSITION_COMMAND,
+            lambda data: self._commands.append((stamp_of(data), data)),
+            required=False,
+        )
 
     def note_desired(self, stamp: int, attitude: np.ndarray | None) -> None:
         """Store q_d (3,) [rad] of a tick, None while not flying, in place of its command."""

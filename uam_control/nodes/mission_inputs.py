@@ -19,7 +19,7 @@ from functools import partial
 from typing import Any
 
 from rclpy.node import Node
-from sensor_msgs.msg import BatteryState, Temperature
+from sensor_msgs.msg import Temperature
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.mission import Mission
@@ -62,12 +62,13 @@ class MissionInputs:
         self._node = node
         self._supervisor, self._inputs = supervisor, supervisor.inputs
         self._poses = PoseSource(node)
-        self._keep(self._poses.topic, self._on_mocap)
-        self._keep(topics.PAYLOAD, self._on_payload)
+        read = self._poses.read  # the supervisor refuses a pose that the estimator cannot use
+        self._keep(self._poses.topic, lambda message: supervisor.mocap(*read(message)))
+        self._keep(topics.PAYLOAD, lambda data: supervisor.payload(*read_pose(data)))
         self._keep(topics.THRUST, self._on_thrust, stamp_of)
         self._keep(topics.IMU_BIAS, self._on_imu_bias, stamp_of)
         self._keep(topics.JOINTS, self._on_joints)
-        self._keep(topics.AUTOPILOT_BATTERY, self._on_battery)
+        self._keep(topics.AUTOPILOT_BATTERY, lambda m: self._inputs.battery(m.percentage))
         node.listen(topics.ARM_TEMPERATURE, self._on_temperature, required=False)
         for topic, subsystem in GAINS:
             self._keep(topic, partial(self._on_gains, subsystem), stamp_of)
@@ -89,14 +90,6 @@ class MissionInputs:
 
         inlet = self._node.listen(topic, handle, required=False)
 
-    def _on_mocap(self, message: Any) -> None:
-        self._supervisor.mocap(
-            *self._poses.read(message)
-        )  # refuses a pose that the estimator cannot use
-
-    def _on_payload(self, data: bytes) -> None:
-        self._supervisor.payload(*read_pose(data))
-
     def _on_thrust(self, data: bytes) -> None:
         _, _, lift = read_values(data, "effort")
         _, _, throttle = read_values(data, "velocity")
@@ -112,9 +105,6 @@ class MissionInputs:
         self._inputs.joints(stamp / SECOND, effort)
         if (grip := read_grip(data)) is not None:
             self._inputs.grip(grip)
-
-    def _on_battery(self, message: BatteryState) -> None:
-        self._inputs.battery(message.percentage)
 
     def _on_temperature(self, message: Temperature) -> None:
         joint = message.header.frame_id

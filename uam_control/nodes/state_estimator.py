@@ -76,7 +76,9 @@ class StateEstimatorNode(UamNode):
         self._odometry_at = 0  # [ns] stamp of the last odometry
         self.poses = PoseSource(self)
         self._mocap = self.listen(self.poses.topic, self._on_mocap)
-        self._joints = self.listen(topics.JOINTS, self._on_joints)
+        self._joints = self.listen(
+            topics.JOINTS, lambda data: self.stage.joints(*read_joints(data, self._names))
+        )
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._diverged_before = 0  # times that the estimate had diverged at the last look
@@ -95,9 +97,6 @@ class StateEstimatorNode(UamNode):
     def note_pose(self, stamp: int) -> None:
         """Note the stamp [ns] of a pose that has arrived."""
         self._exposed.append(stamp)
-
-    def _on_joints(self, data: bytes) -> None:
-        self.stage.joints(*read_joints(data, self._names))
 
     def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()

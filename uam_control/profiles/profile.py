@@ -305,7 +305,8 @@ def profile_of(
     file: named in the profile and in errors; vehicle: see `load_profile`.
     """
     sets, vehicle = {}, vehicle or load_description()
-    _check_whole(file, {node: _law_of(sections.get(node, {})) for node in CONTROLLERS})
+    given = {node: sections.get(node, {}).get("law", catalogue.DEFAULT) for node in CONTROLLERS}
+    _check_whole(file, {node: str(law) for node, law in given.items()})
     derived = derived_parameters(vehicle)
     if ESTIMATOR in sections:
         try:
@@ -329,10 +330,6 @@ def profile_of(
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
     return Profile(file.stem, file, vehicle, sets, sections)
-
-
-def _law_of(section: Mapping[str, Any]) -> str:
-    return str(section.get("law", catalogue.DEFAULT))
 
 
 def _check_whole(file: Path, laws: Mapping[str, str]) -> None:

@@ -37,7 +37,8 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             "gravity": vehicle.gravity,
             "drag": drag,
             "joint_angle_hold": [
-                _rounded_down(0.5 * (joint.high - joint.low)) for joint in vehicle.joints
+                round(math.floor(0.5 * (joint.high - joint.low) / ANGLE_STEP) * ANGLE_STEP, 9)
+                for joint in vehicle.joints
             ],
             "joint_angle_middle": [
                 round(0.5 * (joint.low + joint.high), 6) for joint in vehicle.joints
@@ -81,7 +82,3 @@ def _integral_ratios(vehicle: VehicleDescription) -> list[float]:
     gains = vehicle.autopilot_gains
     pairs = [(gains.get(f"MC_{axis}RATE_I", 0.0), gains[f"MC_{axis}RATE_P"]) for axis in AXES]
     return [round(integral / proportional, 6) for integral, proportional in pairs]
-
-
-def _rounded_down(angle: float) -> float:
-    return round(math.floor(angle / ANGLE_STEP) * ANGLE_STEP, 9)

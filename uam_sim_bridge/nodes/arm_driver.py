@@ -15,7 +15,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Temperature
-from std_msgs.msg import Bool, Float64
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import ALPHA, CHI_DOT
@@ -101,7 +101,9 @@ class ArmDriverNode(UamNode):
             self._stroke = vehicle.gripper.opening
             self._fingers = OpenEnd(self._stroke)
             self.listen(topics.MAGNET, self._on_grip)
-            self.listen(topics.GRIPPER_COMMAND, self._on_opening, required=False)
+            self.listen(
+                topics.GRIPPER_COMMAND, lambda m: self._fingers.command(m.data), required=False
+            )
         self._joints = self.publisher(topics.JOINTS)
         self._temperature = self.publisher(topics.ARM_TEMPERATURE)
         if self.driver.in_position_mode:
@@ -147,9 +149,6 @@ class ArmDriverNode(UamNode):
     def _on_grip(self, message: Bool) -> None:
         self._fingers.switch(message.data)
         self.driver.command_gripper(self._stroke[0] if message.data else self._fingers.opening)
-
-    def _on_opening(self, message: Float64) -> None:
-        self._fingers.command(message.data)
 
     def _on_reference(self, data: bytes) -> None:
         reference = read_reference(data, len(self._names))[1]

@@ -51,21 +51,9 @@ class AutopilotTopics:
             text = f"{report.phase.value}{held}; autopilot {report.mode.name}, {armed}{lost}"
             self._logger.info("; ".join((text, *report.reasons)))
         self._last = report
-        state = AutopilotState(
-            report.connected,
-            report.mode.name,
-            report.armed,
-            report.armed_since,
-            "; ".join(report.reasons),
-            report.round_trip,
-            report.released_to,
-            report.landed,
-            report.lands,
-            report.loop_delay,
-            report.failed,
-            report.stopped,
-        )
-        message = state.to_message(stamp)
+        told = report._asdict() | {"mode": report.mode.name, "reasons": "; ".join(report.reasons)}
+        del told["phase"]
+        message = AutopilotState(**told).to_message(stamp)
         if self._link.parameters.required:
             message.status = [*message.status, comparison(self._link.parameters).to_status()]
         message.status = [*message.status, *self._radio().to_message(stamp).status]

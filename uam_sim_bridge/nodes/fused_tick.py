@@ -129,7 +129,7 @@ class FusedTick:
         readers = {
             poses.topic: (self._estimator, self._on_pose),
             topics.JOINTS: (self._estimator, self._on_joints),
-            topics.PAYLOAD: (self._mission, self._on_payload),
+            topics.PAYLOAD: (self._mission, lambda data: self._tick.tick(payload=read_pose(data))),
             topics.IMU: (self._estimator, lambda data: self._samples.append(read_imu(data))),
         }
         for topic, (node, handle) in readers.items():
@@ -152,9 +152,6 @@ class FusedTick:
         finally:
             known = None if grip is None else (readings[0], grip)
             self._tick.tick(joints=(*readings, effort), grip=known)
-
-    def _on_payload(self, data: bytes) -> None:
-        self._tick.tick(payload=read_pose(data))
 
     def often(self, subscription: Subscription) -> bool:
         """Return whether a subscription is read at each wake-up: the IMU, the clock of its stamps.

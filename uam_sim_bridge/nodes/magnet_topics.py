@@ -21,14 +21,12 @@ class MagnetTopics:
     ) -> None:
         """now: the time [s] at which a command arrives."""
         self.switching = MagnetSwitching(parameters)
-        self._now = now
-        self.subscription = node.listen(topics.MAGNET, self._on_command)
+        self.subscription = node.listen(
+            topics.MAGNET, lambda message: self.switching.command(now(), message.data)
+        )
         self._publisher = node.publisher(topics.MAGNET_STATE)
         self._published: bool | None = None
         self._due = 0.0
-
-    def _on_command(self, message: Bool) -> None:
-        self.switching.command(self._now(), bool(message.data))
 
     def publish(self, time: float, state: bool | None) -> None:
         """Publish the state when it changes, and once per STATE_PERIOD; None: it is unknown."""

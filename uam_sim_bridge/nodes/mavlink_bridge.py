@@ -12,14 +12,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from enum import Enum
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
-from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from uam_control.mission.mission_output import HAND_CHECK
@@ -42,12 +40,7 @@ from uam_control.supervision import State
 from uam_control.supervision.pace import Waited
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import (
-    PositionCommand,
-    read_position_command,
-    read_state,
-    read_torque,
-)
+from uam_msgs_py.messages.control import read_position_command, read_state, read_torque
 from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.status import ERROR, OK, WARN, MissionStatus
@@ -67,19 +60,8 @@ from uam_sim_bridge.nodes.fault_topic import FaultTopic
 
 NAME = "mavlink_bridge"
 LATENCY = 0.05  # s, latency of sensors: a state or pose may be `stale_after` + LATENCY old
+BAD = object()  # in place of an invalid message
 WATCH_PERIOD = 0.02  # s, period of the real-time watchdog and of its setpoints
-
-
-class Unusable(Enum):
-    """Placeholder for an invalid message."""
-
-    BAD = 0
-
-
-BAD = Unusable.BAD
-StateOrBad = np.ndarray | Unusable
-CommandOrBad = PositionCommand | Unusable
-TorqueOrBad = tuple[np.ndarray | None] | Unusable
 
 
 class MavlinkBridgeNode(UamNode):
@@ -132,9 +114,11 @@ class MavlinkBridgeNode(UamNode):
         names = [t.name for t in (topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND)]
         self._join = StampJoin(names, self._tick)
         self.joins.append(self._join)
-        self._arming = self.listen(topics.ARMING, self._on_arming, required=False)
+        self._arming = self.listen(topics.ARMING, lambda m: self.stage.arm(m.data), required=False)
         self._poses = PoseSource(self)
-        self._mocap = self.listen(self._poses.topic, self._on_mocap)
+        self._mocap = self.listen(
+            self._poses.topic, lambda message: self.stage.mocap(*self._poses.read(message))
+        )
         self._mission = self.listen(topics.MISSION_STATUS, self._on_mission, required=False)
         self._feed(topics.STATE, self._read_state)
         self._feed(topics.POSITION_COMMAND, read_position_command)
@@ -148,7 +132,7 @@ class MavlinkBridgeNode(UamNode):
 
     def _configure(self, parameters: RateThrustParameters) -> None:
         self.stage.map.configure(parameters)
-        self.link.set_mapping(parameters)
+        self.link.parameters.set_mapping(parameters)
 
     def destroy_node(self) -> None:
         """Close the link, then the node."""
@@ -181,9 +165,6 @@ class MavlinkBridgeNode(UamNode):
         stamp, torque = read_torque(data)
         return stamp, (torque,)  # in a tuple: a torque None is "idle", for the join "missing"
 
-    def _on_arming(self, message: Bool) -> None:
-        self.stage.arm(bool(message.data))
-
     def _on_mission(self, message: DiagnosticArray) -> None:
         stamp, status = MissionStatus.from_message(message)
         failsafe = status.state == State.FAILSAFE.value
@@ -212,12 +193,8 @@ class MavlinkBridgeNode(UamNode):
         self.get_logger().warning(f"command kill: {response.message}")
         return response
 
-    def _on_mocap(self, message: Any) -> None:
-        self.stage.mocap(*self._poses.read(message))
-
-    def _tick(
-        self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
-    ) -> None:
+    def _tick(self, stamp: int, state: Any, position: Any, torque: Any) -> None:
+        """Run a tick; state (3, 6 + n), PositionCommand, (tau_q (3,) or None,), or BAD."""
         begun = time.perf_counter()
         self._commanded = stamp
         self.take_waiting(self._arming)
@@ -289,7 +266,7 @@ class MavlinkBridgeNode(UamNode):
         """Adopt the autopilot's parameters if `autopilot_parameters` is adopt; not while armed."""
         link = self.link
         adopting = self._options.autopilot_parameters == "adopt"
-        if not adopting or link.armed or not link.mapping_read:
+        if not adopting or link.armed or not link.parameters.mapping_read:
             return
         old = self.stage.map.parameters
         changes = tuple(differences(old, link.values, link.sequence.firmware))
@@ -359,10 +336,10 @@ class MavlinkBridgeNode(UamNode):
             "landed": link.landed,
             "messages of other systems": link.ignored,
             "other autopilots": ", ".join(map(str, sorted(link.foreign))),
-            "refused": link.refused,
+            "refused": link.codec.refused,
             "heartbeat": link.alive,
-            "link open": link.open,
-            "frames dropped": link.dropped,
+            "link open": link.transport.connected,
+            "frames dropped": link.transport.dropped,
             "ground station held back": self._station.held_back if self._station else None,
             "level hold": self.stage.source.holding,
             "adopted": "; ".join(self._adopted),

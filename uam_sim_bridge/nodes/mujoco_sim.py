@@ -131,7 +131,9 @@ class Simulator:
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         needed = wiring.reporting(options.recorded, self._own_names)
-        self._awaited = Awaited(self.connections, needed, self._tell)
+        self._awaited = Awaited(
+            self.connections, needed, lambda whom: self.health.waiting(whom, self.plant.time)
+        )
         period, heard = self.plant.period, (self.answers, self.recorded, self._awaited)
         self._lockstep = Lockstep(node, self.executor, options, stop, period, *heard)
         self._published = 0  # wall time [ns] of its publication
@@ -314,9 +316,6 @@ class Simulator:
         taken, gyro, force = samples.hil
         self.hil.prepare(taken, gyro, force, truth.state[0, POSITION], truth.quaternion)
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
-
-    def _tell(self, whom: str) -> None:
-        self.health.waiting(whom, self.plant.time)
 
     def _receive_hil(self, timeout: float | None = None) -> None:
         """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""

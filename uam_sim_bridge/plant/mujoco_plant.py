@@ -269,11 +269,9 @@ class MujocoPlant(Plant):
             )
 
     def sense(self) -> Samples:
-        """See `Plant.sense`."""
         return self.observe(self._unused_truth)
 
     def observe(self, row: np.ndarray) -> Samples:
-        """See `Plant.observe`."""
         if self.tick == self._observed or self.tick not in self._drawn:
             self.draw_noise()
         self._observed = self.tick
@@ -323,7 +321,6 @@ class MujocoPlant(Plant):
         return a.samples[row].copy() if tick == a.taken.item(row) else None
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
-        """See `Plant.step`."""
         if self.tick not in self._drawn:
             self.draw_noise()
         if self._hinge is not None:
@@ -338,7 +335,6 @@ class MujocoPlant(Plant):
         return failure(error, self.model)
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """See `Plant.disturb`."""
         efficiency, friction, softness, gain = self._undisturbed
         model, dofs = self.model, self._arm_dofs
         self.rotors.efficiency[:] = efficiency * disturbance.rotor_parts
@@ -356,11 +352,9 @@ class MujocoPlant(Plant):
         self._swing_rate = disturbance.payload_swing
 
     def open_to(self, opening: float) -> None:
-        """See `Plant.open_to`."""
         self._fingers.open_to(opening)
 
     def push(self, force: np.ndarray, torque: np.ndarray) -> None:
-        """See `Plant.push`."""
         self._push[:3], self._push[3:] = force, torque
 
     def _held_by_magnet(self, magnet: bool) -> bool:
@@ -376,7 +370,6 @@ class MujocoPlant(Plant):
         return magnet
 
     def truth(self) -> Truth:
-        """See `Plant.truth`."""
         at, row = self.truth_row, np.empty(self.truth_row.width)
         self._write_truth(self.arrays.observed, self.magnet_gain, at, row)
         return Truth(

@@ -98,14 +98,12 @@ class DynamixelBus(ServoBus):
     def __init__(
         self, device: str, baud_rate: int, allowance: float, port: SerialPort | None = None
     ) -> None:
-        """See `ServoBus`."""
         super().__init__(device, baud_rate, allowance, port)
         self._overdue = Overdue()
         self._reader, self._read = PacketReader(), deque[Packet]()
         self._heard = False  # bytes since the last instruction
 
     def ping(self, servo: int) -> int:
-        """See `ServoBus`."""
         data = self._ask(Packet(servo, protocol.PING), 3)  # model number and firmware
         return int.from_bytes(data[:2], "little")
 
@@ -124,15 +122,12 @@ class DynamixelBus(ServoBus):
         }
 
     def read_bytes(self, servo: int, register: Register) -> bytes:
-        """See `ServoBus`."""
         return self._ask(Packet(servo, protocol.READ, _place(register)), register.size)
 
     def write_bytes(self, servo: int, register: Register, data: bytes) -> None:
-        """See `ServoBus`."""
         self._ask(Packet(servo, protocol.WRITE, word(register.address, 2) + data), 0)
 
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
-        """See `ServoBus`."""
         goals = b"".join(
             bytes([servo]) + word(value, register.size) for servo, value in values.items()
         )
@@ -151,7 +146,6 @@ class DynamixelBus(ServoBus):
             return read(size, set(servos))
 
     def reboot(self, servo: int) -> None:
-        """See `ServoBus`."""
         with suppress(Refused):
             self._ask(Packet(servo, protocol.REBOOT), 0)
         self.alerts.discard(servo)

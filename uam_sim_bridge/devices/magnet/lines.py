@@ -91,15 +91,12 @@ class GpioLine(Line):
             ) from None
 
     def set(self, on: bool) -> None:
-        """See `Line`."""
         self._lines.set_value(self._number, Value.ACTIVE if on else Value.INACTIVE)
 
     def read(self) -> bool:
-        """See `Line`."""
         return self._lines.get_value(self._number) is Value.ACTIVE
 
     def close(self) -> None:
-        """See `Line`."""
         self._lines.release()
 
 
@@ -123,7 +120,6 @@ class FileLine(Line):
         self._level(on)
 
     def read(self) -> bool:
-        """See `Line`."""
         return (self._file.read_text(encoding="utf-8") == "1") is not self._active_low
 
     def close(self) -> None:
