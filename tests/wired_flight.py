@@ -102,7 +102,7 @@ class WiredAutopilot:
         """Open new sockets: at the start, and in a fork, whose sockets must be its own."""
         codec, ports = Codec(1, 1), [free_port() for _ in range(2)]
         self._udp, self._second = (UdpPort(port, 9, codec) for port in ports)
-        self.transport = self.link._transport = _Kept((HOST, ports[0]))
+        self.transport = self.link.transport = _Kept((HOST, ports[0]))
         self.ground = GroundStation(ports[1])
 
     def __getattr__(self, name):

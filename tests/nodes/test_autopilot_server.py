@@ -195,11 +195,11 @@ def test_garbage_and_truncated_bytes_are_survived(flight):
     flight.airborne()
     noise = random.Random(3)
     stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    good = flight.link._codec
+    good = flight.link.codec
     kill = good.encode(mavlink2.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0))
     for _ in range(200):
-        flight.link._transport.send(noise.randbytes(noise.randrange(1, 300)))
-        flight.link._transport.send(kill[: noise.randrange(1, len(kill))])
+        flight.link.transport.send(noise.randbytes(noise.randrange(1, 300)))
+        flight.link.transport.send(kill[: noise.randrange(1, len(kill))])
         stranger.sendto(kill, ("127.0.0.1", flight.udp))  # not the first peer
         flight.tick(thrust=HOVER / 41.36)
     assert flight.hil.armed and flight.link.mode is Mode.OFFBOARD
@@ -216,11 +216,11 @@ def test_signed_flight_and_no_answer_to_others(start):
     f = Flight(start, Signing.from_text(key), ("--signing-key", key))
     f.airborne()
     assert f.link.codec.refused == 0
-    other = f.link._codec
-    f.link._codec = Codec(1, 191)  # no signature: the stream ends for the autopilot
+    other = f.link.codec
+    f.link.codec = Codec(1, 191)  # no signature: the stream ends for the autopilot
     f.run(1.3, thrust=HOVER / 41.36)
     assert f.link.mode is Mode.LAND
-    f.link._codec = other
+    f.link.codec = other
     f.run(0.1)
     assert f.link.mode is Mode.LAND and f.hil.armed
     f.close()
