@@ -5,8 +5,6 @@ cores it would take turns with the nodes: each answer of the servo bus waited so
 a core, and the bus carried half of its rate.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 from pathlib import Path

@@ -7,8 +7,6 @@ autopilot with a clock of its own requires. The cycles of the servo bus have the
 limit to how fast they catch up: nothing waits for them.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The simulated battery of the stand-in: PX4's SIM_BAT_* (module battery_simulator)."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 from uam_control.settings.plain_members import plain_members

@@ -1,7 +1,5 @@
 """The autopilot's side of the link to a companion computer: messages in and out, no sockets."""
 
-from __future__ import annotations
-
 import math
 import struct
 

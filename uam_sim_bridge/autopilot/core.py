@@ -5,8 +5,6 @@ that of the sensor samples. One `update` is one cycle of PX4's rate loop (gyro f
 allocation, thrust model) with attitude loop, commander, land detector and estimator.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Ground contact: low thrust, no motion. Maybe landed: minimal thrust, no rotation
 some time. Each stage takes a third of LNDMC_TRIG_TIME; a violated condition resets it at once.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -23,8 +23,6 @@ examples:
   autopilot --companion /dev/ttyUSB0:921600  TELEM2 on this line, simulator over TCP
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import select

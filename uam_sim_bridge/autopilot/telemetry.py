@@ -1,7 +1,5 @@
 """Telemetry of the autopilot: message streams at their intervals, on sensor time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

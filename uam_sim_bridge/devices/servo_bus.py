@@ -4,8 +4,6 @@ A make is a class after `ServoBus` in a folder of its own, with a protocol that 
 use, too: see `dynamixel`.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import termios

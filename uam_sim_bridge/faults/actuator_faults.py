@@ -1,7 +1,5 @@
 """Faults of motors, battery, servos, magnet and payload; and wind gusts."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Faults of cables, devices and wiring. They need the devices of a rehearsal: `uam rehearse`."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from uam_control.settings.parameter_set import number

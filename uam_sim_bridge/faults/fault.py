@@ -4,8 +4,6 @@ A fault is a subclass of the base of its kind. Its fields are its parameters, it
 description for the user, and its name is that of the class: `MotorLoss` is `motor_loss`.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, dataclass_transform
 

@@ -1,7 +1,5 @@
 """All faults by name, their creation from parameters, and their list for the terminal."""
 
-from __future__ import annotations
-
 from types import ModuleType
 
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError

@@ -1,7 +1,5 @@
 """Checks whether engine, processes and machine allow the faults of a flight."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 
 from uam_control.vehicle import VehicleDescription, load_description

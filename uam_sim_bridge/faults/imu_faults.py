@@ -1,7 +1,5 @@
 """Faults of the IMUs (bias, saturation, dropout, stamps) and of the joint encoders."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.settings.parameter_set import choice, number

@@ -1,7 +1,5 @@
 """Faults of the MAVLink connection between bridge and autopilot: cut, delay, corruption."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

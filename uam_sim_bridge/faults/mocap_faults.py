@@ -1,7 +1,5 @@
 """Faults of the motion capture: dropout, freeze, jump, exchanged axes, latency, outliers, clock."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

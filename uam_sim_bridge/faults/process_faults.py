@@ -1,7 +1,5 @@
 """Faults of processes: killed, stopped, slow, without discovery. They require the ROS engine."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from uam_control.settings.parameter_set import choice, number

@@ -1,7 +1,5 @@
 """Begin and end of the faults of a schedule, tick by tick."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Pulls the cables of a laboratory at their times, and plugs them in again."""
 
-from __future__ import annotations
-
 from uam_sim_bridge.faults import cable_faults as kinds
 from uam_sim_bridge.faults.cable_faults import CableFault
 from uam_sim_bridge.faults.schedule import Schedule

@@ -9,8 +9,6 @@ before EKF2's height is valid loses its altitude, and PX4 does not arm: it is se
 reports it complete.
 """
 
-from __future__ import annotations
-
 import math
 import select
 import time

@@ -8,8 +8,6 @@
 The plant's own delays of sensors and commands are off where a device has its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

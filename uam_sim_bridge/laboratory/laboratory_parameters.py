@@ -1,7 +1,5 @@
 """Parameters of a simulated vehicle, and of the laboratory in which it stands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ Steps and the motions that pass them: docs/preflight.md. The person waits a seco
 holds, and goes back. Steps without a motion are confirmed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

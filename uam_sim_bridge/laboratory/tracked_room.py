@@ -6,8 +6,6 @@ w world, t tracker, b base_link, r rigid body; see `drivers.mocap.calibration`. 
 something else: another upward axis, or a rigid body made with another heading.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mistakes of the set-up: servos mounted otherwise than described, cameras set up otherwise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ are driven. A thread of its own exchanges goals and states with the servos at ab
 the wall clock, so that a busy node does not delay the bus.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import sys

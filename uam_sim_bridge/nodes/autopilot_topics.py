@@ -1,7 +1,5 @@
 """Reports of the autopilot: /uam/autopilot/state, /uam/autopilot/battery, log lines."""
 
-from __future__ import annotations
-
 import math
 import time
 

@@ -1,7 +1,5 @@
 """The bridge's links: to the autopilot, its magnet, and a ground station."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """All parameters of the bridge: those of its node, and of the objects in it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.ages import STALE

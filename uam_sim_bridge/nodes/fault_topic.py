@@ -1,7 +1,5 @@
 """/uam/faults: each fault that begins or ends."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from rclpy.node import Node

@@ -10,8 +10,6 @@ of a topic between them, they pass each other messages as separate nodes do. The
 The process is the unit: when it ends, all of its nodes have ended, the bridge's heartbeats too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ between the stages at the end of the tick. The nodes' subscriptions to each othe
 and another publisher is refused and named; their messages are not used.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import Any

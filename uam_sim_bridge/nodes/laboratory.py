@@ -6,8 +6,6 @@ sensor as a driver of its own. It reads the mission's status for the times of fa
 of the checklist, which its person does.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import math

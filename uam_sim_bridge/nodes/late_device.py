@@ -1,7 +1,5 @@
 """A device that may be absent when its driver starts: refused, or waited for."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Generic, TypeVar

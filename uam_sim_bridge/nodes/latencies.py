@@ -1,7 +1,5 @@
 """Latency from an IMU sample to its setpoint, in real time."""
 
-from __future__ import annotations
-
 from uam_control.stamps import nanoseconds
 from uam_sim_bridge.nodes.plant_options import Statistics
 

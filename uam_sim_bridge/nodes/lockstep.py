@@ -6,8 +6,6 @@ began and an answer is still missing, a message was lost, or a node answers noth
 has ended or is stopped reports nothing; `uam fly` finds it by its state.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Collection

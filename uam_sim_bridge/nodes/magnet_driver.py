@@ -3,8 +3,6 @@
 For a magnet on an output of the autopilot see the parameter `magnet` of `mavlink_bridge`.
 """
 
-from __future__ import annotations
-
 import time
 
 from uam_msgs_py.messages.status import ERROR, OK, WARN

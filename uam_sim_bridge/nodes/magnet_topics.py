@@ -1,7 +1,5 @@
 """Commands of the magnet in, its state out: for the bridge and for the driver of a line."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from std_msgs.msg import Bool

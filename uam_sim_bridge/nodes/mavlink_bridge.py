@@ -7,8 +7,6 @@ After `stale_after` without commands (by the stamps of the state, in real time a
 clock) the node runs `BridgeStage.without`.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

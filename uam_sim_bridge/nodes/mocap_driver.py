@@ -4,8 +4,6 @@ The node waits for packets in place of messages: it has no inputs, and a pose mu
 timer. A body that is lost leaves its topic silent; the diagnostics say why.
 """
 
-from __future__ import annotations
-
 import time
 
 from rclpy.clock import Clock, ClockType

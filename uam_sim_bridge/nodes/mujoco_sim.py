@@ -21,8 +21,6 @@ realtime  Ticks begin at absolute deadlines of the wall clock, one control perio
           The bridge publishes /uam/setpoint after it has sent the setpoint to the autopilot.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import math

@@ -1,7 +1,5 @@
 """The plant's entry of /diagnostics, once a second of wall time."""
 
-from __future__ import annotations
-
 import time
 
 from rclpy.node import Node

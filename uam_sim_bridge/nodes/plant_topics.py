@@ -1,7 +1,5 @@
 """The plant's side of the ROS topics: sensors and truth out, answers in."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 

@@ -3,8 +3,6 @@
 Read from the compiled model, so that any form of MJCF counts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -13,8 +13,6 @@ not finite is set back to the model's initial one, contacts without memory are l
 returns its text as that of an error.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The physics engines by name. A new engine is a class and a line here, or "module:Class"."""
 
-from __future__ import annotations
-
 import inspect
 import pkgutil
 

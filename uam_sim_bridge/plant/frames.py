@@ -1,7 +1,5 @@
 """Frames of the vehicle's bodies (arm, magnet, fingers), from the same MJCF as the URDF."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

@@ -1,7 +1,5 @@
 """The plant in MuJoCo: rigid bodies and contacts; rotors, servos, magnet, air and sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

@@ -1,7 +1,5 @@
 """Bodies of the entries `environment` of a scenario in the plant's model."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

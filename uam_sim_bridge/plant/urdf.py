@@ -1,7 +1,5 @@
 """URDF of the vehicle, generated from the compiled MJCF, the source of masses, axes and shapes."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 import mujoco

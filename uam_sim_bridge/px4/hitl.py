@@ -13,8 +13,6 @@ examples:
   px4_hitl --companion /dev/pts/3:921600 --usb /dev/pts/5   sensors on another line
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Mapping, Sequence

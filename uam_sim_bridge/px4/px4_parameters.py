@@ -1,7 +1,5 @@
 """PX4's parameters for this vehicle: PX4's names and their values, from config/ and the user."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence

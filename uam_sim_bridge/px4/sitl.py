@@ -13,8 +13,6 @@ examples:
   px4_sitl --param COM_OF_LOSS_T=1.0 --param SDLOG_MODE=0
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -15,8 +15,6 @@ runs this loop at the rate of its estimate, some 100 Hz, and estimates the hover
 vectors are NED.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ A cycle writes the goals (Sync Write), reads current, velocity and position (Syn
 then one slow block of one servo. Source of the packet lengths: ROBOTIS e-manual, Protocol 2.0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 BITS_PER_BYTE = 10

@@ -4,8 +4,6 @@ An answer has no number that names its instruction. After a stall of the compute
 the answer to an instruction that was given up may come in place of the next one: see `Overdue`.
 """
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The chain of servos as described: section `arm` of a lab file and the vehicle's joints."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

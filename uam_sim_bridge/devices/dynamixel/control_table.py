@@ -5,8 +5,6 @@ addresses, sizes, the unit of the velocity and the counts of a turn, but no acce
 initial values and no unit of the current.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from dataclasses import dataclass

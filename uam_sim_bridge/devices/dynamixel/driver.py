@@ -8,8 +8,6 @@ reacts to their age; the other servos get zero current. After a lost device the 
 again by itself.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 import time

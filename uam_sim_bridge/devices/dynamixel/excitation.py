@@ -1,7 +1,5 @@
 """Motion that excites one joint through the driver, the others held, with criteria to abort."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

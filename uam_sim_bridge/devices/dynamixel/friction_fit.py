@@ -10,8 +10,6 @@ load if the arm alone is too light. Samples slower than SLOWEST, and those whose
 such a sample, are left out: there the friction is stiction, and the acceleration has steps.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

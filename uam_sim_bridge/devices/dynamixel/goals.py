@@ -1,7 +1,5 @@
 """Commands of the joints → goal registers of the servos, within the limits of angle and current."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

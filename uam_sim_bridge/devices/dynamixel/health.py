@@ -1,7 +1,5 @@
 """Health of the servos and of the bus, for /diagnostics."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Parameters of the arm's driver."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, choice, integer, number, switch

@@ -5,8 +5,6 @@ Protocol 2.0. The maker's library is the other end in the tests; why it is not u
 docs/architecture.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 HEADER = b"\xff\xff\xfd\x00"

@@ -4,8 +4,6 @@ Each problem is one line. What the bus cannot show is the sign of a joint that i
 two servos of one model swapped at equal angles: those are checked by hand (docs/hardware.md).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations, product

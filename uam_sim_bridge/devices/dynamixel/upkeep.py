@@ -5,8 +5,6 @@ whose watchdog has tripped, or that answers again is prepared anew. A hardware e
 without torque until a reboot.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import cycle, product
 

@@ -5,8 +5,6 @@ A new kind is a class and an entry.
 The kind is the first word of the parameter `chip`: `simulated:FILE`; a path alone is a GPIO chip.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from abc import ABC, abstractmethod

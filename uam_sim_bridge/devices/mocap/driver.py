@@ -1,7 +1,5 @@
 """Frames of a tracking system → stamped poses of vehicle and payload, and the health of both."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import deque

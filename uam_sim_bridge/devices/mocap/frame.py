@@ -1,7 +1,5 @@
 """What a motion capture source delivers: frames with the rigid bodies of one exposure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 

@@ -3,8 +3,6 @@
 [arrival in ns, {"body": [x, y, z, qw, qx, qy, qz], ...}]
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -4,8 +4,6 @@ It runs in a process of its own: its calls wait for the next frame without limit
 vendor's code must not end the driver. The library gives neither stamps nor numbers of frames.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import select

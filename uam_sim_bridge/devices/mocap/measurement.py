@@ -3,8 +3,6 @@
 Its poses come from the running system, or from a recording: CSV, in the tracker's axes.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import time

@@ -1,7 +1,5 @@
 """Parameters of the motion capture driver, and the source that they choose."""
 
-from __future__ import annotations
-
 import platform
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ a damaged packet ends its receiving thread, and it does not read the frequency o
 clock, without which the stamps have no unit.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import NamedTuple
 

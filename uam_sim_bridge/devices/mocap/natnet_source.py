@@ -4,8 +4,6 @@ The server's first answer says whether frames come by multicast or unicast. A se
 silent is asked again, so Motive may be started later or restarted.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import math
 import select

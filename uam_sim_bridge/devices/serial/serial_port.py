@@ -1,7 +1,5 @@
 """A serial line on which this computer asks and others answer, with the waits for the answers."""
 
-from __future__ import annotations
-
 import contextlib
 import select
 import termios

@@ -4,8 +4,6 @@ The control laws use neither sensor. PX4 requires both: its data validator repor
 constant value as failed.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

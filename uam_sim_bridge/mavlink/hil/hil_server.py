@@ -5,8 +5,6 @@ The wait is limited by `answer_timeout` if the autopilot answered the last tick,
 `silent_timeout`. PX4 sends no answer during boot and while disarmed without a setpoint stream.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import select
 import socket

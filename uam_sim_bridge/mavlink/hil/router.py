@@ -21,8 +21,6 @@ examples:
   hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3
 """
 
-from __future__ import annotations
-
 import math
 import select
 import signal

@@ -1,7 +1,5 @@
 """Ports as in PX4 SITL, UDP to the companion, TCP to the simulator; executables that have them."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import socket

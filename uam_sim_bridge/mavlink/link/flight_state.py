@@ -5,8 +5,6 @@ arrives after the answer and has the old state: without care, "armed, and not in
 mean that a pilot has control.
 """
 
-from __future__ import annotations
-
 import math
 
 from uam_control.offboard.exchange import Request

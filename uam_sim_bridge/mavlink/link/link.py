@@ -5,8 +5,6 @@ on wall time. TIMESYNC alone may have another clock: where the autopilot's IMU s
 their times follow from TIMESYNC.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Values of the link and of the autopilot's health for /diagnostics."""
 
-from __future__ import annotations
-
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.telemetry.vitals import ESTIMATOR_FLAGS, estimate_faults, names
 

@@ -1,7 +1,5 @@
 """Setpoints and motion-capture poses as MAVLink messages, and back."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from uam_control.frames import swap_euler, swap_world

@@ -5,8 +5,6 @@ After a false start byte pymavlink's stream parser skips as many bytes as the fa
 behind them.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 

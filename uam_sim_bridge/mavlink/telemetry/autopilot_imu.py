@@ -4,8 +4,6 @@ PX4 v1.16 sends the selected IMU, integrated over IMU_INTEG_RATE (200 Hz by defa
 estimated biases; time_usec is the sample's time since boot.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from typing import NamedTuple

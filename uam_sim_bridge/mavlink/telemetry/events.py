@@ -13,8 +13,6 @@ MAVLink marks EVENT as work in progress, so pymavlink omits it; it is added to t
 import. PX4 reports most failed arming checks only as EVENT.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import Any
 

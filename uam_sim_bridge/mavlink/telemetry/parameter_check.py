@@ -4,8 +4,6 @@ PX4 sends an integer parameter as four bytes in the float field of PARAM_VALUE; 
 the type. Other firmwares send its value.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Iterable, Iterator, Mapping

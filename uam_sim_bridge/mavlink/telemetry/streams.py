@@ -5,8 +5,6 @@ waits for the answer to the previous one. PX4 refuses to change the rate of HEAR
 therefore only counted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

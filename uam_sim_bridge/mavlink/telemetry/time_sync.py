@@ -6,8 +6,6 @@ of it: short round trips get a higher weight. Times are those of the companion's
 is the clock of the ticks, round trips have a resolution of one tick.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -6,8 +6,6 @@ vibration degrades the height estimate. The battery's state comes from BATTERY_S
 SYS_STATUS until BATTERY_STATUS reports a voltage.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ limit of bytes per tick and, on a line of known rate, a limited share of this ra
 does not receive the station's messages, so they cannot change the autopilot's state in the bridge.
 """
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable

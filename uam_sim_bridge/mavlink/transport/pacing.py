@@ -1,7 +1,5 @@
 """A line that is slower than what is sent: rate limit (token bucket), rate meter, and outbox."""
 
-from __future__ import annotations
-
 from collections import deque
 
 from uam_sim_bridge.mavlink.transport.transport import Transport

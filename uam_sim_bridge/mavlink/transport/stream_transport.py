@@ -5,8 +5,6 @@ written frame is sent before the next frame, so the receiver never gets half a f
 `send` and `receive` try to open the link again at growing intervals; there is no thread.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

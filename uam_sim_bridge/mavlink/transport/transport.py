@@ -8,8 +8,6 @@
 | `serial:DEVICE:BAUD` | serial line or USB; opened again after unplugging |
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

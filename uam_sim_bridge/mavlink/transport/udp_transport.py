@@ -1,7 +1,5 @@
 """MAVLink over UDP: one or several messages per datagram, one peer."""
 
-from __future__ import annotations
-
 import ipaddress
 import socket
 

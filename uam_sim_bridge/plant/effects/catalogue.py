@@ -1,7 +1,5 @@
 """All effects by name. A new one is a file beside this one and a line in KINDS."""
 
-from __future__ import annotations
-
 from uam_sim_bridge.plant.effects.arm_occlusion import ArmOcclusion
 from uam_sim_bridge.plant.effects.battery_sag import BatterySag
 from uam_sim_bridge.plant.effects.cable_torque import CableTorque

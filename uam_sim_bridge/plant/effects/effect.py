@@ -5,8 +5,6 @@ for the user, and its name is that of the class: `GroundEffect` is `ground_effec
 in config/plant/; a parameter has no default.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

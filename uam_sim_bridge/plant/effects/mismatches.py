@@ -1,7 +1,5 @@
 """A vehicle, and a motion capture, that are not what the vehicle file says."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

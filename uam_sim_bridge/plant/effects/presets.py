@@ -8,8 +8,6 @@
 A parameter that a file does not give is that of laboratory.yaml, or of odometry.yaml.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 

@@ -3,8 +3,6 @@
 Source of the behaviour: ROBOTIS e-manual, XM430-W210 and Protocol 2.0.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

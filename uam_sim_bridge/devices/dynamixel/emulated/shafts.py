@@ -3,8 +3,6 @@
 Angles of a shaft are those of the servo's output, counter-clockwise positive, 0 at position 2048.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Sequence

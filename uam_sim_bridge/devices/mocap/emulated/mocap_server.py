@@ -8,8 +8,6 @@
 the owner, a simulation, hands them over by `expose`.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 import random

@@ -5,8 +5,6 @@ Little-endian, without padding. Source: OptiTrack's NatNet documentation and its
 an error in one does not hide in the other.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
