@@ -242,10 +242,6 @@ class GraspExecutive:
         mass = identified_mass(self._before, self._present_load(), sight.lever)
         return by_mass(mass, self._expected, self.parameters)
 
-    def _evidence(self, sight: Sight) -> Evidence:
-        pose, own = by_travel(sight, *self._gripped, self.parameters), self._felt(sight)
-        return fused(sight, pose, own, self._mass(sight))
-
     def _felt(self, sight: Sight) -> Evidence:
         return self._gripper.held(sight, self.parameters)
 
@@ -271,7 +267,8 @@ class GraspExecutive:
         if self._reserve.short:
             self._set_down(sight)
             return
-        evidence = self._evidence(sight)
+        pose = by_travel(sight, *self._gripped, self.parameters)
+        evidence = fused(sight, pose, self._felt(sight), self._mass(sight))
         lasts = self._lasting(sight.stamp, bool(evidence.held))
         lasted = lasts >= (0.0 if sight.tracked else WEIGHED_FOR)
         if evidence.held and lasted and self._load.span(sight.stamp) > 0.0:

@@ -235,7 +235,8 @@ class FlightSequence:
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state, armed_since is not None)
             elif output.state is State.GROUNDED and armed_since is None:
-                self._check_permission(stamp)
+                if refusal := self._pre_arm.permission.refusal(stamp):  # it is taken back
+                    self.give_up(stamp, refusal)
         if self._end is None and self._fell_since < math.inf:
             deadline = self._fell_since + self._parameters.failsafe_timeout
             if armed_since is None or stamp >= deadline:
@@ -270,12 +271,6 @@ class FlightSequence:
         else:
             looks = not armed and self._pre_arm.permission.commands(self._stamp)
             self._ground_pose.hand_check(output, state, looks)
-
-    def _check_permission(self, stamp: float) -> None:
-        """End a flight that is not armed yet when the checklist takes its permission back."""
-        refusal = self._pre_arm.permission.refusal(stamp)
-        if refusal:
-            self.give_up(stamp, refusal)
 
     def _observe(
         self, stamp: float, state: np.ndarray, armed_since: float | None, readings: Readings

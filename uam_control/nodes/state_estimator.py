@@ -122,14 +122,10 @@ class StateEstimatorNode(UamNode):
         except ValueError as error:
             self.warn(f"{error}; ignored", "imu")
             return None
-        self._tell_divergence()
-        return found
-
-    def _tell_divergence(self) -> None:
-        """Say so if the estimate has diverged in this tick."""
         if self.stage.diverged > self._diverged_before:
             self._diverged_before = self.stage.diverged
             self.get_logger().error(f"{DIVERGED}; it begins anew")
+        return found
 
     def begin_anew_before(self, stamp: int) -> None:
         """Forget all samples if the stamp [ns] of the next one is that of a new simulation."""

@@ -118,12 +118,6 @@ def _found(support: _Support, identifier: bytes) -> _Support:
     return _Support.from_address(address)
 
 
-def _getter(held: ctypes.Structure):
-    """Return a C function that returns the address of `held`."""
-    address = ctypes.addressof(held)
-    return _GET(lambda _: address)
-
-
 class _Assembled:
     """The type support of TFMessage. Keep the object until the process ends."""
 
@@ -132,7 +126,8 @@ class _Assembled:
         self._describe(_Description.from_address(element.description(ctypes.byref(element))))
         self._hash = _Hash(1, (c_uint8 * 32)(*HASH))
         self._sources = _Sequence()
-        self._getters = [_getter(held) for held in (self._hash, self._description, self._sources)]
+        held = map(ctypes.addressof, (self._hash, self._description, self._sources))
+        self._getters = [_GET(lambda _, at=at: at) for at in held]
         self._callbacks = _copy(_Callbacks, _found(array, FASTRTPS).data)
         self._callbacks.namespace, self._callbacks.name = b"tf2_msgs::msg", NAME.encode()
 

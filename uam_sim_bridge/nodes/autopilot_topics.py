@@ -54,12 +54,10 @@ class AutopilotTopics:
         message = AutopilotState(**told).to_message(stamp)
         if self._link.parameters.required:
             message.status = [*message.status, comparison(self._link.parameters).to_status()]
-        message.status = [*message.status, *self._radio().to_message(stamp).status]
-        self._state.publish(message)
-
-    def _radio(self) -> RadioState:
         received = {None: "", True: "yes", False: "no"}[self._link.vitals.radio]
-        return RadioState(self._link.killed, received)
+        radio = RadioState(self._link.killed, received)
+        message.status = [*message.status, *radio.to_message(stamp).status]
+        self._state.publish(message)
 
     def _publish_battery(self, stamp: int) -> None:
         battery = self._link.vitals.battery

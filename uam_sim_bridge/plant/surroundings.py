@@ -163,7 +163,9 @@ BUILDERS: dict[str, Callable[[mujoco.MjsBody, Entry], None]] = {
 
 def shapes(model: mujoco.MjModel, entries: Sequence[Entry]) -> dict[str, np.ndarray]:
     """Return the geoms of each entry and, under VEHICLE, those of the vehicle."""
-    names = {_body_of(entry, entries): entry["name"] for entry in entries} | {BASE: VEHICLE}
+    tracked = next((one for one in entries if one["kind"] == PAYLOAD), None)
+    names = {PAYLOAD if one is tracked else one["name"]: one["name"] for one in entries}
+    names[BASE] = VEHICLE
     found: dict[str, list[int]] = {name: [] for name in names.values()}
     for geom in range(model.ngeom):
         body = model.geom_bodyid[geom]
@@ -199,9 +201,3 @@ def overlapping(
         if reach < -slack:
             return one[0], other[0], -reach
     return None
-
-
-def _body_of(entry: Entry, entries: Sequence[Entry]) -> str:
-    """Return the name of an entry's body: the first payload is the one that is tracked."""
-    first = next((one for one in entries if one["kind"] == PAYLOAD), None)
-    return PAYLOAD if entry is first else entry["name"]

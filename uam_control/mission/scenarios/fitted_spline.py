@@ -71,7 +71,8 @@ def fitted(
     span = float(times[-1] - times[0])
     step = max(coarsest, span / (len(times) - 1))
     for _ in range(ATTEMPTS):
-        knots = _knots(times, max(1, round(span / step)))
+        inner = np.linspace(times[0], times[-1], max(1, round(span / step)) + 1)
+        knots = np.concatenate([[times[0]] * DEGREE, inner, [times[-1]] * DEGREE])
         found = [_solved(times, group, knots) for group in groups]
         apart = np.array(
             [
@@ -84,11 +85,6 @@ def fitted(
         step /= 2.0
     worst, row = np.unravel_index(np.argmax(apart), apart.shape)
     raise Misfit(int(worst), int(row), float(apart.max()))
-
-
-def _knots(times: np.ndarray, intervals: int) -> np.ndarray:
-    inner = np.linspace(times[0], times[-1], intervals + 1)
-    return np.concatenate([[times[0]] * DEGREE, inner, [times[-1]] * DEGREE])
 
 
 def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSpline:
