@@ -39,7 +39,7 @@ from uam_lab.cli.command import (
 )
 from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
-from uam_lab.flights.flight_settings import FlightSettings, SettingsError
+from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
@@ -109,19 +109,10 @@ def _replay(trial: Trial, number: int, out: Path | None) -> int:
     """Fly a trial with log, report and video; return the exit status."""
     from uam_lab.cli import fly
 
-    profile = trial.profile
-    settings = FlightSettings(
-        scenario=trial.flown_scenario,
-        profile=profile,
-        vehicle=profile.vehicle,
-        payload_mass=trial.payload_mass,
+    settings = trial.settings(
         out=make_folder(None, "campaign", f"flight{number}") if out is None else out,
-        controller=next(iter(profile.laws().values())),
+        controller=next(iter(trial.profile.laws().values())),
         engine="direct",
-        seed=trial.seed,
-        scenario_source=trial.scenario,
-        vehicle_changes=trial.vehicle_changes,
-        faults=trial.faults,
         command=command_line(),
     )
     return fly.fly(settings, video=True, report=True)

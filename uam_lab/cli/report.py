@@ -19,7 +19,6 @@ from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
 from uam_lab.records.results.terminal import Terminal, say
 
-WRITTEN = 0
 # of metrics.json, without which there is no summary
 SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
 
@@ -67,7 +66,7 @@ def one(options: argparse.Namespace) -> int:
     for note in [*(notes or ()), report.problem]:
         if note:
             say(f"note: {note}")
-    return WRITTEN
+    return 0
 
 
 def several(options: argparse.Namespace) -> int:
@@ -86,4 +85,4 @@ def several(options: argparse.Namespace) -> int:
     with reporting(Terminal()) as show:
         page = build_overlay(flights, out, show)
     say(f"report: {page}")
-    return WRITTEN
+    return 0

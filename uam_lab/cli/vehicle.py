@@ -37,7 +37,6 @@ from uam_lab.records.results.result_folder import in_a_name, new_folder
 from uam_lab.records.results.terminal import say
 
 UNIT = "systemd/uam-vehicle.service"
-DONE = 0
 
 
 def add(command: Command) -> None:
@@ -54,13 +53,13 @@ def add(command: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     if options.example:
         say(template(), end="")
-        return DONE
+        return 0
     if options.config is None:
         raise SettingsError("--config LAB is missing; uam vehicle --example prints a template")
     lab = load_lab(options.config)
     if options.systemd:
         say(unit(lab.file, Path.cwd()), end="")
-        return DONE
+        return 0
     from uam_lab.flights.vehicle import vehicle_engine  # needs ROS
 
     settings = settings_of(lab, command_line(), options.dry_run)

@@ -22,8 +22,6 @@ from uam_lab.cli.command import Command
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
-DONE = 0
-
 
 def add(command: Command) -> None:
     vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
@@ -55,4 +53,4 @@ def run(options: argparse.Namespace) -> int:
             f"{described.file.name} flies with these gains after: profiles: {{modular: "
             f"{written[PROFILE_FILE]}}}, autopilot: {written[AUTOPILOT_FILE]}"
         )
-    return DONE
+    return 0

@@ -28,8 +28,6 @@ from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.cli.command import Command
 from uam_lab.records.results.terminal import say
 
-DONE = 0
-
 
 def page(_: str) -> str:
     """Return the docstring of this module with the keys of the answers, and the servos."""
@@ -86,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"written  {folder}: {name}.yaml, {name}.xml, {name}.txt, {name}.png")
     say(f"next     uam vehicle design {written}")
     say(f"         uam fly --vehicle {written} --scenario hover --engine direct")
-    return DONE
+    return 0
 
 
 def _ask(what: str, unit: str, usual: Any) -> str:

@@ -182,41 +182,39 @@ class FlightOptions(KeptOptions):
 
     def check_together(self) -> None:
         """Raise SettingsError for options that contradict each other."""
+        for asks, why in NOT_DIRECT if self.engine == "direct" else ():
+            if asks(self):
+                raise SettingsError(f"the direct engine has {why.format(self)} --engine ros")
         for contradicts, why in CONTRADICTIONS:
             if contradicts(self):
                 raise SettingsError(why.format(self))
 
 
-def _direct(with_it: Callable[[FlightOptions], Any]) -> Callable[[FlightOptions], Any]:
-    return lambda o: o.engine == "direct" and with_it(o)
-
-
-CONTRADICTIONS: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
+# what the direct engine has not: whether it is asked for → what it has, and which option asks
+NOT_DIRECT: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
+    (lambda o: o.clock == "realtime", "no clock: --clock realtime needs"),
     (
-        _direct(lambda o: o.clock == "realtime"),
-        "the direct engine has no clock: --clock realtime needs --engine ros",
+        lambda o: o.autopilot != BUILTIN,
+        "only the built-in autopilot: --autopilot {0.autopilot} needs",
     ),
+    (lambda o: o.without, "no nodes: --without needs"),
+    (lambda o: o.view, "no topics to show: --view needs"),
+    (
+        lambda o: o.namespace.strip("/") or o.domain is not None,
+        "no nodes: --namespace and --domain need",
+    ),
+    (lambda o: o.process or o.tick_times, "no nodes: options of their processes need"),
+    (lambda o: o.fused, "no nodes: --fused needs"),
+)
+CONTRADICTIONS: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
     (
         lambda o: o.imu == AUTOPILOT_IMU and o.autopilot != BUILTIN and o.clock != "realtime",
         "only the stand-in sends its IMU in step with the plant: --imu autopilot with another "
         "--autopilot needs --clock realtime",
     ),
     (
-        _direct(lambda o: o.autopilot != BUILTIN),
-        "the direct engine has only the built-in autopilot: --autopilot {0.autopilot} needs "
-        "--engine ros",
-    ),
-    (
-        _direct(lambda o: o.dry_run),
+        lambda o: o.engine == "direct" and o.dry_run,
         "a dry run needs --engine ros: the direct engine is a simulation",
-    ),
-    (
-        _direct(lambda o: o.without),
-        "the direct engine has no nodes: --without needs --engine ros",
-    ),
-    (
-        _direct(lambda o: o.view),
-        "the direct engine has no topics to show: --view needs --engine ros",
     ),
     (
         lambda o: o.px4_params and o.autopilot != PX4,
@@ -227,18 +225,6 @@ CONTRADICTIONS: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
         lambda o: o.autopilot == PX4 and o.parameters.get("mavlink_bridge", {}).get("signing_key"),
         "signing_key of mavlink_bridge: PX4 v1.16 and v1.17 have no MAVLink signing, v1.18 in "
         "software has no key: the bridge would refuse all messages; leave it out",
-    ),
-    (
-        _direct(lambda o: o.namespace.strip("/") or o.domain is not None),
-        "the direct engine has no nodes: --namespace and --domain need --engine ros",
-    ),
-    (
-        _direct(lambda o: o.process or o.tick_times),
-        "the direct engine has no nodes: options of their processes need --engine ros",
-    ),
-    (
-        _direct(lambda o: o.fused),
-        "the direct engine has no nodes: --fused needs --engine ros",
     ),
     (
         lambda o: o.inner_rate is not None and not o.fused,

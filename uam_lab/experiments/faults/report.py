@@ -33,21 +33,7 @@ COLOURS = {
     FAILSAFE: "#e39b50",
     LOST: "#cf5b4a",
 }
-HEAD = (
-    "fault",
-    "moment",
-    "outcome",
-    "position_m",
-    "attitude_deg",
-    "arm_deg",
-    "duration_s",
-    "down_after_s",
-    "promise_kept",
-    "why",
-    "given",
-    "tilt_deg",
-    "impact_m_s",
-)
+ERRORS = ("position_m", "attitude_deg", "arm_deg")  # keys of `FaultResult.worst`
 LOST_HEAD = ["lost, to repeat it", "largest tilt [°]", "at the ground [m/s]", "why"]
 
 
@@ -63,25 +49,8 @@ def write(
 
     vehicle: its name; again: the command that repeats a flight, without its faults.
     """
-    write_rows(
-        out / "flights.csv",
-        HEAD,
-        (
-            [
-                r.fault,
-                r.moment,
-                r.outcome,
-                *(_shown(worst(r, key)) for key in HEAD[3:6]),
-                f"{r.duration_s:.2f}",
-                "" if r.down_after_s is None else f"{r.down_after_s:.2f}",
-                "" if r.kept is None else r.kept,
-                r.why,
-                r.given,
-                *(_shown(math.nan if one is None else one) for one in (r.tilt_deg, r.impact)),
-            ]
-            for r in results
-        ),
-    )
+    table = list(map(_row, results))
+    write_rows(out / "flights.csv", table[0], (row.values() for row in table))
     facts = {"command": command, "vehicle": vehicle, "versions": versions()}
     facts |= {"matrix": asdict(matrix), "flights": [vars(result) for result in results]}
     write_json(out / "faults.json", facts)
@@ -112,11 +81,28 @@ def write(
         colours=COLOURS,
         picture=templates.embedded(out / "matrix.png"),
         command=command,
-        rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
+        rows=[(r, [_shown(worst(r, key)) for key in ERRORS]) for r in results],
         lost=lost_rows,
     )
     write_text(page, text)
     return summary, page
+
+
+def _row(r: FaultResult) -> dict[str, object]:
+    """Return the row of a flight in flights.csv, by the heads of the columns."""
+    return {
+        "fault": r.fault,
+        "moment": r.moment,
+        "outcome": r.outcome,
+        **{key: _shown(worst(r, key)) for key in ERRORS},
+        "duration_s": f"{r.duration_s:.2f}",
+        "down_after_s": _rounded(r.down_after_s, 2),
+        "promise_kept": "" if r.kept is None else r.kept,
+        "why": r.why,
+        "given": r.given,
+        "tilt_deg": _shown(math.nan if r.tilt_deg is None else r.tilt_deg),
+        "impact_m_s": _shown(math.nan if r.impact is None else r.impact),
+    }
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,21 @@ class Trial:
             return self.carried.scenario
         return load_scenario(self.scenario, self.profile.vehicle)
 
+    def settings(self, **more: Any) -> FlightSettings:
+        """Return the settings of the flight for an engine of `uam fly`; more: further ones."""
+        return FlightSettings(
+            scenario=self.flown_scenario,
+            profile=self.profile,
+            vehicle=self.profile.vehicle,
+            clock=self.clock,
+            payload_mass=self.payload_mass,
+            seed=self.seed,
+            scenario_source=self.scenario,
+            vehicle_changes=self.vehicle_changes,
+            faults=self.faults,
+            **more,
+        )
+
 
 @dataclass(frozen=True)
 class TrialResult:
@@ -111,7 +126,7 @@ def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> O
     """
     scenario = trial.flown_scenario
     if trial.engine == "ros":
-        return _fly_nodes(trial, scenario)
+        return _fly_nodes(trial)
     vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
     flight = DirectFlight(
         scenario, trial.profile, vehicle, trial.payload_mass, trial.seed, trial.faults
@@ -122,7 +137,7 @@ def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> O
     return flight.outcome({"controller": trial.label})
 
 
-def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
+def _fly_nodes(trial: Trial) -> Outcome:
     """Fly a trial with nodes, topics and MAVLink, as `uam fly` does.
 
     Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
@@ -130,18 +145,8 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
     from uam_lab.flights.ros import engine
 
     needed = {one.fault.values["node"] for one in trial.faults.only(PROCESS).faults}
-    settings = FlightSettings(
-        scenario=scenario,
-        profile=trial.profile,
-        vehicle=trial.profile.vehicle,
-        clock=trial.clock,
-        payload_mass=trial.payload_mass,
-        seed=trial.seed,
-        scenario_source=trial.scenario,
-        vehicle_changes=trial.vehicle_changes,
-        without=tuple(name for name in ONLOOKERS if name not in needed),
-        faults=trial.faults,
-    )
+    left_out = tuple(name for name in ONLOOKERS if name not in needed)
+    settings = trial.settings(without=left_out)
     prepare()
     with tempfile.TemporaryDirectory(prefix="uam-flight-") as folder, Interrupts() as stop:
         outcome = engine.fly(settings, ResultFolder(Path(folder)), Observer(), stop)

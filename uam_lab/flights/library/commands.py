@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from uam_control.profiles.profile import Profile
 from uam_lab.flights.library.flight_result import CommandRefused, FlightError
 from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.guest import Guest
@@ -50,32 +49,15 @@ class Commands:
                 self._operator = Operator(self._own("uam_operator"))
             return act(self._operator)
 
-    def command(self, name: str) -> str:
-        """Send a command; return the answer."""
-        return _accepted(self.call(lambda operator: operator.command(name)))
+    def ask(self, name: str, *given: Any) -> str:
+        """Return the answer to a method of the operator with these arguments, if it accepts."""
+        accepted, text = self.call(lambda operator: getattr(operator, name)(*given))
+        if not accepted:
+            raise CommandRefused(text)
+        return text
 
-    def kill(self) -> str:
-        """Stop the motors at once; return the answer."""
-        return _accepted(self.call(Operator.kill))
-
-    def goto(self, x: float, y: float, z: float, yaw: float | None, hand: bool = False) -> str:
-        """Send a goal pose; return the answer."""
-        heading = math.nan if yaw is None else yaw
-        return _accepted(self.call(lambda operator: operator.goto(x, y, z, heading, hand)))
-
-    def plan(self, message: Any, hand: bool = False) -> str:
-        """Send a goal or a trajectory; return the answer."""
-        return _accepted(self.call(lambda operator: operator.plan(message, hand)))
-
-    def change(self, desired: Mapping[str, Mapping[str, Any]]) -> Changes:
-        """Set parameters, all or none."""
-        return self._change(lambda switch: switch.change(desired))
-
-    def switch(self, profile: Profile) -> Changes:
-        """Activate a profile, in all nodes or in none."""
-        return self._change(lambda switch: switch.switch(profile))
-
-    def _change(self, act: Callable[[ProfileSwitch], Changes]) -> Changes:
+    def change(self, act: Callable[[ProfileSwitch], Changes]) -> Changes:
+        """Return act(switch): what it has changed in all nodes, or in none; one call at a time."""
         with self._lock, _refusals():
             if self._switch is None:
                 self._switch = ProfileSwitch(self._own("uam_parameters"))
@@ -100,13 +82,6 @@ def _refusals() -> Iterator[None]:
         raise FlightError(str(error)) from None
 
 
-def _accepted(answer: tuple[bool, str]) -> str:
-    accepted, text = answer
-    if not accepted:
-        raise CommandRefused(text)
-    return text
-
-
 class Hand:
     """Commands as those of `Flight`; each raises CommandRefused with the reason."""
 
@@ -116,11 +91,11 @@ class Hand:
     def goto(self, x: float, y: float, z: float, yaw: float | None = None) -> str:
         """Bring the hand to a position [m, ENU] and hold it there; yaw [rad]: heading, None: as it
         is. Returns the answer."""
-        return self._commands().goto(x, y, z, yaw, hand=True)
+        return self._commands().ask("goto", x, y, z, math.nan if yaw is None else yaw, True)
 
     def plan(self, message: Any) -> str:
         """Fly a PoseStamped, a MultiDOFJointTrajectory or a TwistStamped of the hand."""
-        return self._commands().plan(message, hand=True)
+        return self._commands().ask("plan", message, True)
 
     @property
     def pose(self) -> PoseStamped:

@@ -275,11 +275,11 @@ class Flight:
 
     def kill(self) -> str:
         """Stop the motors at once, in the air too: the vehicle falls."""
-        return self._commands().kill()
+        return self._commands().ask("kill")
 
     def goto(self, x: float, y: float, z: float, yaw: float | None = None) -> str:
         """Fly to a position [m, ENU] and hold it; yaw [rad], None: keep the heading."""
-        return self._commands().goto(x, y, z, yaw)
+        return self._commands().ask("goto", x, y, z, math.nan if yaw is None else yaw)
 
     @property
     def hand(self) -> Hand:
@@ -293,7 +293,7 @@ class Flight:
 
         Returns the mission's answer. Raises CommandRefused with its reason (docs/scenarios.md).
         """
-        return self._commands().plan(message)
+        return self._commands().ask("plan", message)
 
     def set_parameters(self, node: str | Mapping[str, Mapping[str, Any]], **values: Any) -> Changes:
         """Set parameters of a node in flight, or of several: node → name → value.
@@ -302,14 +302,14 @@ class Flight:
         CommandRefused with the reason.
         """
         desired = {node: values} if isinstance(node, str) else node
-        return self._commands().change(desired)
+        return self._commands().change(lambda switch: switch.change(desired))
 
     def set_profile(self, *names_or_files: str | Path) -> Changes:
         """Switch to another profile in flight, see `load_profile`; otherwise as set_parameters."""
         given = [str(configuration.named("profiles", str(one))) for one in names_or_files]
         flown = self.settings
         profile = load_profile(*given, vehicle=flown.vehicle, namespace=flown.namespace)
-        return self._commands().switch(profile)
+        return self._commands().change(lambda switch: switch.switch(profile))
 
     def inject(self, fault: str, duration: float = math.inf, **parameters: Any) -> None:
         """Inject a fault of a process now, as inject("node_stall", 2.0, node="arm_controller").
@@ -333,7 +333,7 @@ class Flight:
     def _command(self, name: str) -> str:
         commands = self._commands()
         self._history.forget()
-        return commands.command(name)
+        return commands.ask("command", name)
 
     def _commands(self) -> Commands:
         """Return the clients, when the nodes have found each other."""

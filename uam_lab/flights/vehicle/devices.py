@@ -5,6 +5,7 @@ For each: whether it is there, else what is missing and how to check it.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from uam_control.offboard.autopilot_magnet import ACTUATOR
 from uam_lab.flights.observer import STARTING, DeviceState
@@ -32,15 +33,18 @@ Reports = Mapping[str, Report]
 
 @dataclass(frozen=True)
 class Device:
-    """One device. advice: how to check it; found: of the reports, whether it is there, and text."""
+    """One device. advice: how to check it; node: that reports it; found: by the report, whether it
+    is there, and text."""
 
     name: str
     advice: str
-    found: Callable[[Reports], tuple[bool, str]]
+    node: str
+    found: Callable[[Report], tuple[bool, str]]
 
     def state(self, reports: Reports) -> DeviceState:
         """Return the state of the device by the reports of the nodes: name → report."""
-        present, text = self.found(reports)
+        report = reports.get(self.node)
+        present, text = (False, STARTING) if report is None else self.found(report)
         return DeviceState(self.name, present, text, self.advice)
 
 
@@ -49,10 +53,10 @@ def devices(lab: Lab) -> list[Device]:
     arm = f"supply of the servos; ls -l /dev/serial/by-id; uam arm --config {lab.file}"
     return [
         _mocap(lab),
-        Device("arm", arm, lambda reports: _driven(reports, wiring.ARM_DRIVER)),
+        Device("arm", arm, wiring.ARM_DRIVER, _driven),
         *([_magnet(lab)] if lab.magnet.through in (GPIO, AUTOPILOT) else []),
-        Device("autopilot", _autopilot_advice(lab), lambda reports: _autopilot(lab, reports)),
-        Device("imu", _imu_advice(lab), lambda reports: _sensor(reports, topics.IMU)),
+        Device("autopilot", _autopilot_advice(lab), wiring.BRIDGE, partial(_autopilot, lab)),
+        Device("imu", _imu_advice(lab), wiring.ESTIMATOR, partial(_sensor, topics.IMU)),
     ]
 
 
@@ -60,32 +64,29 @@ def _mocap(lab: Lab) -> Device:
     if lab.mocap is None:
         topic = f"/{topics.MOCAP.name}"
         text = f"ros2 topic hz {topic} in the domain of this flight; is your driver in it?"
-        return Device("motion capture", text, lambda reports: _sensor(reports, topics.MOCAP))
+        return Device("motion capture", text, wiring.ESTIMATOR, partial(_sensor, topics.MOCAP))
     m = lab.mocap
     text = f"ping {m.server}"
     if m.source == NATNET:
         text += "; Motive: Data Streaming, NatNet on, Local Interface not loopback"
     text += f"; uam calibrate-mocap --config {lab.file} lists bodies"
-    return Device("motion capture", text, lambda reports: _driven(reports, wiring.MOCAP_DRIVER))
+    return Device("motion capture", text, wiring.MOCAP_DRIVER, _driven)
 
 
 def _magnet(lab: Lab) -> Device:
     if lab.magnet.through == GPIO:
         line = lab.magnet.line
         text = f"gpiodetect; gpioinfo; ls -l {line.chip}: group gpio?"
-        return Device("magnet", text, lambda reports: _driven(reports, wiring.MAGNET_DRIVER))
+        return Device("magnet", text, wiring.MAGNET_DRIVER, _driven)
     if lab.magnet.output.magnet == ACTUATOR:
         output = f"Peripheral via Actuator Set {lab.magnet.output.magnet_output}"
         text = f"QGroundControl, Actuators: {output}"
     else:
         text = "QGroundControl, Actuators: Gripper; PX4: PD_GRIPPER_TYPE 0"
-    return Device("magnet", text, _autopilots_magnet)
+    return Device("magnet", text, wiring.BRIDGE, _autopilots_magnet)
 
 
-def _autopilots_magnet(reports: Reports) -> tuple[bool, str]:
-    report = reports.get(wiring.BRIDGE)
-    if report is None:
-        return False, STARTING
+def _autopilots_magnet(report: Report) -> tuple[bool, str]:
     state = report.values.get("magnet", "")
     on = {"True": "on", "False": "off"}.get(state)
     return (False, "no acknowledgement of the autopilot") if on is None else (True, on)
@@ -107,19 +108,13 @@ def _imu_advice(lab: Lab) -> str:
     return f"ros2 topic hz /{topics.IMU.name} in the domain of this flight; is your driver in it?"
 
 
-def _driven(reports: Reports, node: str) -> tuple[bool, str]:
+def _driven(report: Report) -> tuple[bool, str]:
     """Return whether a driver has its device: it reports an error without."""
-    report = reports.get(node)
-    if report is None:
-        return False, STARTING
     return report.level != ERROR, "open" if report.level == STALE else report.message
 
 
-def _sensor(reports: Reports, topic: topics.Topic) -> tuple[bool, str]:
+def _sensor(topic: topics.Topic, report: Report) -> tuple[bool, str]:
     """Return whether the estimator receives a topic."""
-    report = reports.get(wiring.ESTIMATOR)
-    if report is None:
-        return False, STARTING
     known = [text for key, text in report.values.items() if key.endswith(f"/{topic.name} [ms]")]
     age = float(known[0]) if known and known[0] else None
     if age is None:
@@ -129,10 +124,7 @@ def _sensor(reports: Reports, topic: topics.Topic) -> tuple[bool, str]:
     return True, f"messages on /{topic.name}"
 
 
-def _autopilot(lab: Lab, reports: Reports) -> tuple[bool, str]:
-    report = reports.get(wiring.BRIDGE)
-    if report is None:
-        return False, STARTING
+def _autopilot(lab: Lab, report: Report) -> tuple[bool, str]:
     if report.values.get("heartbeat") == "True":
         text = f"mode {report.values.get('autopilot mode', '')}"
         return True, text if report.level == STALE else f"{text}; {report.message}"
