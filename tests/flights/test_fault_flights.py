@@ -262,6 +262,18 @@ def test_a_frozen_tracker_is_rejected():
     assert not flight.armed
 
 
+def test_a_stuck_encoder_at_the_grasp_is_noticed_and_the_payload_is_delivered():
+    fault = "encoder_stuck@pick+1.43+3"
+    _, series, figures = flown(fault, seed=9001, plant="laboratory", scenario=QUICK_PICK)
+    assert classify(series, figures) == "completed", figures["shortfalls"]
+    stuck = (series.time > 7.44) & (series.time < 10.42)
+    assert np.ptp(series["estimate.alpha_1"][stuck & (series.time > 8.0)]) < 1e-4
+    held = [one["cause"] for one in figures["transitions"] if one["to"] == "holding"]
+    assert held == ["angle of a joint stays the same while its torque and its reference change"]
+    # the arm swings, but not over: without the rule to -72 degrees from 42
+    assert np.degrees(series["truth.alpha_1"][stuck].min()) > -30.0
+
+
 def test_the_same_seed_gives_the_same_flight_with_random_faults():
     spec = "mocap_outliers@hover+1+2:share=0.1,distance=0.1"
     first, again, other = flown(spec), flown(spec), flown(spec, seed=2)

@@ -29,6 +29,7 @@ from uam_control.supervision.checks import (
     LATE,
     LATE_FOR_REFERENCE,
     LATE_LOOP,
+    STILL,
     Checks,
     measure,
     read,
@@ -75,13 +76,14 @@ def test_motors_go_off_on_the_ground_alone():
 def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), np.ones((2, 2)), values)
-    assert np.isnan(values).sum() == 15
+    assert np.isnan(values).sum() == 16
     nothing = Readings()
     read(nothing.values, nothing.joint_effort, nothing.gains, two, three, values)
     assert np.flatnonzero(np.isnan(values)).tolist() == [
         LATE,
         LATE_LOOP,
         LATE_FOR_REFERENCE,
+        STILL,
     ]  # by `Checks.update`
     checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None

@@ -14,6 +14,7 @@ from uam_control.supervision.checks import (
     LATE,
     LATE_FOR_REFERENCE,
     LATE_LOOP,
+    STILL,
     Checks,
     measure,
     read,
@@ -112,13 +113,13 @@ def test_readings_have_their_places():
     np.testing.assert_array_equal(values[:9], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
-        values[9:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 77, 20]
+        values[9:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 77, 20, 77]
     )
 
 
 def test_what_is_unknown_is_below_every_limit():
     values = np.zeros(len(CHECKS))
-    values[[LATE, LATE_LOOP, LATE_FOR_REFERENCE]] = -math.inf  # by `Checks.update`
+    values[[LATE, LATE_LOOP, LATE_FOR_REFERENCE, STILL]] = -math.inf  # by `Checks.update`
     nothing = Readings()
     read(
         *(nothing.values, nothing.joint_effort, nothing.gains),
@@ -366,4 +367,4 @@ def test_other_limits_are_those_of_the_next_tick():
 
 
 def test_every_quantity_is_named_once():
-    assert len({check.name for check in CHECKS}) == len(CHECKS) == 24
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 25

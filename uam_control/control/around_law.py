@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.arm.still_joint import stands
 from uam_control.control.arm_load import ArmLoad, arm_load
 from uam_control.control.output_limits import (
     LONGEST_PREDICTION,
@@ -122,7 +123,7 @@ class AttitudeArrays(NamedTuple):
 class ArmArrays(NamedTuple):
     """Of the `ArmController`. inertia, gain, limit, integral: see `complete_effort`. command (n,):
     is given goals if `goals`, of reference or state, plus compliance [rad/(N m)] tau; hold (1,):
-    when, see `is_new`."""
+    when, see `is_new`; still (n,): see `let_go`."""
 
     all: ControllerArrays
     load: ArmLoad
@@ -136,6 +137,7 @@ class ArmArrays(NamedTuple):
     of_reference: bool
     compliance: float
     hold: np.ndarray
+    still: np.ndarray
 
 
 @borrowing
@@ -192,6 +194,19 @@ def predict_by(prediction: np.ndarray, loop_delay: float) -> None:
     p.measured, p.ahead = loop_delay, p.prediction
     if p.counts and math.isfinite(loop_delay):
         p.ahead = min(LONGEST_PREDICTION, p.prediction + max(0.0, loop_delay - p.nominal))
+
+
+@borrowing
+def let_go(a: ArmArrays, state: np.ndarray, reference: np.ndarray) -> None:
+    """Take the errors from a joint while its reading contradicts its torque, see `stands`.
+
+    It keeps its known load and its theta_hat, which do not wind up on a wrong angle.
+    """
+    of = a.all
+    for i in range(len(a.still)):
+        angle, wanted = state[CHI, ALPHA + i], reference[CHI, ALPHA + i]
+        if stands(a.still, i, angle, wanted, of.tau[i], a.torque_max[i], 1.0):
+            of.errors[E, ALPHA + i] = of.errors[E_DOT, ALPHA + i] = 0.0
 
 
 @borrowing

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from uam_control.arm.still_joint import still_joints
 from uam_control.control.around_law import (
     PREDICTION,
     REAL,
@@ -23,6 +24,7 @@ from uam_control.control.around_law import (
     end_arm,
     end_attitude,
     end_position,
+    let_go,
     predict_by,
 )
 from uam_control.control.output_limits import (
@@ -288,6 +290,7 @@ class ArmController(Controller):
         joints = len(parameters.inertia)
         self._hold = SampleHold(parameters.goal_rate)
         self._integral = np.zeros(joints)
+        self._still = still_joints(joints)
         # goals do not exist before the first tick
         to_goals = parameters.setpoint == POSITION_SERVO
         self.command = np.full(joints, np.nan) if to_goals else None
@@ -303,16 +306,22 @@ class ArmController(Controller):
             np.array(p.integral_gain, dtype=float),
             *(float(p.integral_limit), self._integral, np.array(p.torque_max, dtype=float)),
             *(self.command, to_goals, p.goal_from == REFERENCE, float(p.goal_compliance)),
-            self._hold.memory,
+            *(self._hold.memory, self._still),
         )
         rows = self._errors
         self._begin = bound(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)
+        self._let_go = bound(let_go, arrays, rows, rows)
         self._end = bound(end_arm, arrays, rows, rows, 0.0)
         return arrays
 
     def _forget(self) -> None:
         super()._forget()
         self._integral[:] = 0.0
+
+    @property
+    def stuck(self) -> list[int]:
+        """The joints, from 1 on, that have no feedback, see `around_law.let_go`."""
+        return [i + 1 for i in np.flatnonzero(self._still["stands"])]
 
     def update(
         self,
@@ -325,6 +334,10 @@ class ArmController(Controller):
         """Return the torques and set `command`; the arguments: see `AttitudeController.update`."""
         self._fit(state)
         self._begin(state, reference, attitude_reference, flying)
+        if flying:
+            self._let_go(state, reference)
+        else:
+            self._still["angle"] = math.nan
         self._run_law(dt)
         self._end(state, reference, dt)
         return self._tau

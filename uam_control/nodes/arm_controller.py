@@ -46,6 +46,9 @@ class ArmControllerNode(ControllerNode):
         fades, on = self.hand.fades, self.parameter_set.current.hand_bandwidth > 0.0
         if fades and fades != TEXTS[IDLE]:
             level, summary = max(level, WARN), f"the hand's stabilisation fades out: {fades}"
+        if stuck := self.controller.stuck:
+            joints = ", ".join(map(str, stuck))
+            level, summary = max(level, WARN), f"no feedback of stuck joints: {joints}"
         told = (f"fades out: {fades}" if fades else "acts") if on else "off"
         return level, summary, values | {"hand's stabilisation": told}
 

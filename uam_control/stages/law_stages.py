@@ -13,6 +13,7 @@ from uam_control.control.around_law import (
     end_attitude,
     end_position,
     given,
+    let_go,
     predict_by,
 )
 from uam_control.control.controllers import AttitudeController, Controller
@@ -173,6 +174,7 @@ def arm_step(law: Callable) -> Callable[[tuple], int]:
         s, r, stage, inputs, reference = a
         dt = step_to(stage, s.numbers[0].stamp)
         begin_law(r.all, s.state, reference, s.attitude_reference, True)
+        let_go(r, s.state, reference)
         law(r.all.law.record, given(r.all, dt), r.all.law.adaptation, r.all.law.tau)
         end_arm(r, s.state, reference, dt)
         keep_gains(stage, inputs, ARM, s.numbers[0].stamp, r.all.law.adaptation)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import FORWARDED, usable
+from uam_control.arm.still_joint import SOON, stands, still_joints
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
@@ -25,6 +26,7 @@ REFERENCE_DELAY = "delay for the reference"
 DELAYS = (SETPOINT_DELAY, REFERENCE_DELAY)  # of the link, known before the take-off
 POSES_OFF = "motion capture"
 CONTRADICTION = "motion capture and IMU"
+STUCK = "angle of a joint"
 
 
 class Check(NamedTuple):
@@ -110,10 +112,12 @@ CHECKS = (
           "stands", REFERENCE_DELAY),
     Check("simulation", "the {name} runs {value:.0%} slower than the wall clock, {limit:.0%} "
           "allowed; the autopilot has its own clock", "slower_hold", reading="slower"),
+    Check(STUCK, "{name} stays the same while its torque and its reference change", 0.5,
+          in_flight=True),
 )  # fmt: skip
-LATE, LATE_LOOP, LATE_FOR_REFERENCE, EFFORT, GAIN = (
+LATE, LATE_LOOP, LATE_FOR_REFERENCE, EFFORT, GAIN, STILL = (
     [check.name for check in CHECKS].index(it)
-    for it in (SETPOINT_DELAY, LOOP_DELAY, REFERENCE_DELAY, "joint torque", "adapted gain")
+    for it in (SETPOINT_DELAY, LOOP_DELAY, REFERENCE_DELAY, "joint torque", "adapted gain", STUCK)
 )
 BLIND = frozenset(check.name for check in CHECKS if check.blind)
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
@@ -142,12 +146,13 @@ class ExceededLimit(NamedTuple):
 class CheckArrays(NamedTuple):
     """bounds: all limits in one array. Of every quantity the lowest limit, below which no monitor
     changes while all are quiet; low and high corner (3,) of the box [m]; gains (3,) of position,
-    attitude, arm; `joints` angles [rad] and their middle; torques [N m]. values: of CHECKS;
-    numbers (1,): joints, setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the
-    parameters."""
+    attitude, arm; `joints` angles [rad] and their middle; torques [N m]. values: of CHECKS; still
+    (joints,): of `stands`; numbers (1,): joints, setpoint_delay [s] of `Checks`, delay_nominal [s]
+    and share of the parameters."""
 
     bounds: np.ndarray
     values: np.ndarray
+    still: np.ndarray
     numbers: np.ndarray
 
 
@@ -165,6 +170,7 @@ class Checks:
         self._monitors = [Monitor() for _ in CHECKS]
         self.quiet = True
         self._values = np.zeros(len(CHECKS))
+        self._still = still_joints(len(parameters.joint_angle_hold))
         self.finding: ExceededLimit | None = None
         self.memory = record("joints", "setpoint_delay delay_nominal share")
         self.setpoint_delay = math.nan
@@ -188,7 +194,7 @@ class Checks:
         parts = first, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
         parts += np.zeros(len(p.joint_angle_hold)) + p.joint_angle_middle, p.joint_effort_hold
         bounds = np.concatenate([np.array(part) for part in parts])
-        self.arrays = CheckArrays(bounds.astype(float), self._values, self.memory)
+        self.arrays = CheckArrays(bounds.astype(float), self._values, self._still, self.memory)
         self.memory["joints"] = len(p.joint_angle_hold)
         self.memory["delay_nominal"] = p.delay_nominal
         self.memory["share"] = p.delay_share_of_round_trip
@@ -267,6 +273,12 @@ def measure_all(
     ranges = bounds[angle:effort].reshape((2, m.joints))
     measure(state, reference, readings.position, age, ground, corners, ranges, values)
     read(known, readings.effort, readings.gains, bounds[effort:], bounds[gain:angle], values)
+    values[STILL] = 0.0
+    for i in range(min(state.shape[1] - ALPHA, len(readings.effort), len(a.still))):
+        own = state[CHI, ALPHA + i] if in_flight else math.nan
+        wanted, torque = reference[CHI, ALPHA + i], readings.effort[i]
+        if stands(a.still, i, own, wanted, torque, bounds[effort + i], SOON):
+            values[STILL] = 1.0
     link = by_link(known[_ROUND_TRIP], m.share, in_flight)
     loop = by_loop(known[_LOOP_DELAY], m.delay_nominal, in_flight)
     m.setpoint_delay = larger(link, loop)
