@@ -355,10 +355,10 @@ class FlightSequence:
     def _descend(self, stamp: float) -> None:
         """Descend in an unplanned landing, vertically from the vehicle's position: not on a stand.
 
-        First it moves clear of one that is near.
+        First it moves clear of one that is near, slowly: its setpoints may be late.
         """
         if self._clear_at is None:
-            self._clear_at = self._guidance.retreat(stamp)
+            self._clear_at = self._guidance.retreat(stamp, hurried=False)
         if stamp < self._clear_at:
             return
         stow, self._descent = self._descent.stow, None
