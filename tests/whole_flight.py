@@ -108,15 +108,20 @@ def is_gone(pid: int) -> bool:
 
 
 def lock_is_held(instance: int) -> bool:
-    """Whether some process holds the lock of an instance; a lock file without holder is removed."""
+    """Whether some process holds the lock of an instance; fail for a file that nobody holds.
+
+    Another flight may be about to take it, or to remove it: not at once.
+    """
     file = Path(tempfile.gettempdir()) / f"uam-{os.getuid()}-{instance}.lock"
-    try:
-        with file.open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except BlockingIOError:
-        return True
+    for _ in range(20):
+        try:
+            with file.open() as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except FileNotFoundError:
+            return False
+        except BlockingIOError:
+            return True
+        time.sleep(0.1)
     raise AssertionError(f"{file} was left behind")
 
 
