@@ -28,7 +28,7 @@ from uam_sim_bridge.ports import INSTANCES, flight_of
 if TYPE_CHECKING:
     from uam_lab.flights.processes.guest import Guest
 
-Subcommands = argparse._SubParsersAction  # argparse has no other name for it
+Subcommands = Any  # what `add_subparsers` returns: argparse has no public name for it
 WRONG_USE = 2  # exit status
 
 
