@@ -70,7 +70,7 @@ class LinearBlock:
             block = LinearBlock(a, b, c, block.d, block.inputs, block.outputs)
 
 
-def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> Self:
+def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> LinearBlock:
     """Return the block that delays each of `inputs` by `ticks` and names it as in `outputs`."""
     width, size = len(inputs), ticks * len(inputs)
     a, b = np.eye(size, k=-width), np.eye(size, width)
@@ -78,7 +78,7 @@ def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> Self:
     return LinearBlock(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
 
 
-def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> Self:
+def join(blocks: Iterable[LinearBlock], added: Collection[str] = ()) -> LinearBlock:
     """Connect each input with the output of the same name; return the whole as a block.
 
     added: signals to which the input IN + name is added. Inputs that no block drives stay inputs.
@@ -119,7 +119,7 @@ def linearise(
     inputs: Sequence[str],
     outputs: Sequence[str],
     at: np.ndarray | None = None,
-) -> Self:
+) -> LinearBlock:
     """Return the block of `step`: inputs (m,) → outputs (p,), by central differences.
 
     objects: what keeps the state between two steps; every float array that can be reached from them

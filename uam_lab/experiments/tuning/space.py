@@ -139,7 +139,7 @@ class Space:
 
 def load_space(
     name_or_file: str, start: Profile | None = None, vehicle: VehicleDescription | None = None
-) -> Self:
+) -> Space:
     """Read a file of config/tuning, or another one.
 
     start: None for the vehicle's profile of the file's law; vehicle: None for the default one.

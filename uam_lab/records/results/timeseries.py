@@ -173,7 +173,7 @@ class FlightTable:
         self.count = number + 1
         return self.values[number]
 
-    def series(self, info: Mapping[str, Any] | None = None) -> Self:
+    def series(self, info: Mapping[str, Any] | None = None) -> "Series":
         """Return the recorded rows, with error columns, end effector and countdown computed."""
         values, columns = self.values[: self.count], self.columns
         count_down(values[:, columns["time"]])
@@ -293,7 +293,7 @@ class Series:
             pq.write_table(self.table(), temporary, compression="zstd")
 
 
-def read(path: Path) -> Self:
+def read(path: Path) -> Series:
     """Read a flight from a file.
 
     Raises UnreadableFlight if it is no parquet file or if required columns are missing.

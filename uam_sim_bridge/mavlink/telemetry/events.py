@@ -44,7 +44,7 @@ class EventMessage(mavlink2.MAVLink_message):
     msgname = "EVENT"
     ordered_fieldnames = list(_ON_THE_WIRE)
     orders = [3, 4, 0, 1, 2, 5, 6]
-    fieldnames = [_ON_THE_WIRE[place] for place in (3, 4, 0, 1, 2, 5, 6)]
+    fieldnames = [_ON_THE_WIRE[place] for place in orders]
     fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: dict[str, str] = {}
     fieldenums_by_name: dict[str, str] = {}
