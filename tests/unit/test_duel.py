@@ -112,6 +112,9 @@ def test_the_pick_is_flown_with_its_basket_and_without_a_hover():
         ({"rows": {"a": {"law": "pid"}}}, "pid"),
         ({"published": {"MAC": {"ee_circle_099": [1, 2, 3]}}}, "ee_circle_099"),
         ({"published": {"MAC": {"ee_circle_010": [1, 2]}}}, "ee_circle_010"),
+        ({"delays_ms": 12}, "delays_ms"),
+        ({"delays_ms": [12, "late"]}, "delays_ms"),
+        ({"seeds": 0}, "seeds"),
     ],
 )
 def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
@@ -121,6 +124,14 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
     with pytest.raises(ConfigurationError, match=said) as found:
         load_duel(str(file))
     assert "\n" not in str(found.value)
+
+
+def test_a_duel_without_published_figures_has_those_flown_alone(tmp_path):
+    document = yaml.safe_load(configuration.path("duel/pillars.yaml").read_text())
+    document.pop("published", None)
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(document))
+    assert load_duel(str(file)).published == {}
 
 
 def test_an_unknown_row_is_refused():

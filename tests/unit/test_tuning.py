@@ -131,7 +131,11 @@ def test_a_bad_knob_is_refused_by_name(tmp_path, knob, complaint):
         ({"flights": [{"payload_mass": "heavy", "seed": 1}]}, "flights[0].payload_mass: a number"),
         ({"flights": [{"payload_mass": 0.1, "seed": 1, "wind": 3}]}, "flights[0].wind: unknown"),
         ({"cost": {**SPACE["cost"], "aim": [1.0]}}, "cost.aim: a list of 8 numbers expected"),
+        ({"cost": {**SPACE["cost"], "aim": [0.0] * 8}}, "cost.aim: 0 is not above 0"),
+        ({"cost": {**SPACE["cost"], "restless_allowed": [1, 0]}}, "restless_allowed: 0 is not"),
+        ({"cost": {**SPACE["cost"], "lost": -1.0}}, "cost.lost: -1 is below 0"),
         ({"cost": None}, "cost: a mapping expected, got None"),
+        ({"knobs": [SPACE["knobs"][1]] * 2}, "knobs: the same entries of a parameter twice"),
         ({"delay_margin": 0.05}, "delay_margin: a mapping expected, got 0.05"),
     ],
 )
@@ -154,6 +158,15 @@ def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys
     best = load_profile(str(out / "best.yaml"))
     assert best.sets["arm_controller"].varpi > 0.0
     assert (out / "search.png").stat().st_size > 0
+
+
+def test_ctrl_c_says_how_the_search_goes_on(tmp_path, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("uam_lab.experiments.tuning.search.search", interrupted)
+    assert main(["tune", "--space", write(tmp_path), "--out", str(tmp_path / "out")]) == 130
+    assert "the same command continues the search" in capsys.readouterr().err
 
 
 def test_a_start_whose_evaluation_was_killed_is_evaluated_again(tmp_path, capsys):

@@ -21,7 +21,6 @@ study.journal.
 
 import argparse
 import signal
-import sys
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
@@ -113,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
             "uam tune: interrupted; the same command continues the search"
             if options.out
             else f"uam tune: interrupted; --out {out} continues the search",
-            file=sys.stderr,
+            error=True,
         )
     study = open_study(task)
     if not study.get_trials(deepcopy=False, states=DONE):

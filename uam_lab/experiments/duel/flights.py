@@ -104,22 +104,24 @@ def load_duel(name_or_file: str, labels: Sequence[str] = ()) -> Duel:
         if label not in given.values:
             raise given.error(label, f"no such row; there are: {', '.join(given.values)}")
     loads = {name: load_scenario(name, vehicle).payload_mass for name in top.texts("scenarios")}
-    of = top.section("published")
+    of = top.section("published") if top.has("published") else top.like({})
     for label in of.values:
         cells = of.section(label)
         cells.only(loads)
         counts = {name: 4 if loads[name] else 3 for name in cells.values}
         published[label] = {name: cells.numbers(name, count) for name, count in counts.items()}
-    hover = top.text("hover", default="")
+    hover, delays = top.text("hover", default=""), ()
     if hover:
+        listed = top.entry("delays_ms")
+        delays = top.numbers("delays_ms", len(listed) if isinstance(listed, list) else 1)
         load_scenario(hover, vehicle)  # an invalid one is refused before any flight
     return Duel(
         vehicle,
         top.texts("plant"),
         loads,
         hover,
-        top.whole("seeds"),
-        tuple(map(float, top.entry("delays_ms"))) if hover else (),
+        top.whole("seeds", 1),
+        delays,
         {label: _profile(given.section(label), vehicle) for label in labels or given.values},
         published,
     )

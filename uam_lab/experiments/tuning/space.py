@@ -162,6 +162,8 @@ def load_space(
         top.section("delay_margin").number("at_least") if two else None,
     )
     top.only_asked()
+    if len(space.start_values) < len(space.knobs):
+        raise TuningError(f"{file}: knobs: the same entries of a parameter twice")
     return space
 
 
@@ -182,10 +184,14 @@ def _cost(entry: Section, coordinates: int) -> Cost:
     names = [field.name for field in fields(Cost)]
     entry.only(names)
     counts = {"aim": coordinates, "restless_allowed": 2}
-    return Cost(**{
-        name: entry.numbers(name, counts[name]) if name in counts else entry.number(name)
+    values = {
+        name: entry.numbers(name, counts[name]) if name in counts else entry.not_negative(name)
         for name in names
-    })  # fmt: skip
+    }
+    for name in counts:
+        if min(values[name]) <= 0.0:
+            raise entry.error(name, f"{min(values[name]):g} is not above 0")
+    return Cost(**values)
 
 
 def _knob(entry: Section, start: Profile) -> Knob:
