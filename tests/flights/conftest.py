@@ -48,7 +48,7 @@ class SharedFlights:
     """Flights with one seed that have ended, each with the same scenario.
 
     single: in a ROS domain of its own, with a report. uav1, uav2: two vehicles in one domain, each
-    in its namespace.
+    in its namespace; uav1 in the fused layout.
     """
 
     single: Flight
@@ -69,6 +69,7 @@ def shared_flights(tmp_path_factory, short_scenario):
             for name in ("uav1", "uav2")
         }
         flights = {"single": Flight(folder / "single", *options, report=True)}
+        vehicles["uav1"] += ("--fused",)
         flights |= {name: Flight(folder / name, *given) for name, given in vehicles.items()}
         try:
             statuses = {name: flight.wait() for name, flight in flights.items()}

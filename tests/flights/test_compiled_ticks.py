@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from whole_flight import longer
 
 from uam_control.mission import load_scenario
 from uam_control.offboard.modes import Mode
@@ -81,12 +82,12 @@ END = 100_000  # ticks: later than any end
 @pytest.mark.parametrize(
     ("options", "share"),
     [
-        ({"scenario": "circle"}, 0.85),  # a CSV file: no moves
+        longer({"scenario": "circle"}, 0.85),  # a CSV file: no moves
         ({"scenario": "quick_pick"}, 0.6),
         ({"scenario": "quick_pick", "seed": 3, "air": GUSTS}, 0.4),  # the clock stops, shifts
-        pytest.param({"scenario": "hover", "law": "asmc1"}, 0.75, marks=pytest.mark.long),
-        pytest.param({"scenario": "hover", "law": "asmc2"}, 0.75, marks=pytest.mark.long),
-        ({"scenario": "hover", "vehicle": "hexa_arm"}, 0.75),
+        longer({"scenario": "hover", "law": "asmc1"}, 0.75),
+        longer({"scenario": "hover", "law": "asmc2"}, 0.75),
+        longer({"scenario": "hover", "vehicle": "hexa_arm"}, 0.75),
         ({"scenario": "arm3_motions", "vehicle": "s500_arm3"}, 0.75),
     ],
     ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
@@ -183,8 +184,8 @@ def full_table(one):
 @pytest.mark.parametrize(
     "change",
     [
-        *(late_poses, frozen_poses, broken_estimate, storm, hold, land),
-        *(pilot, magnet, gains, full_table),
+        *(late_poses, broken_estimate, hold, pilot, gains, full_table),
+        *map(longer, (frozen_poses, storm, land, magnet)),
     ],
 )
 def test_an_incident_is_the_same(change):
@@ -219,11 +220,11 @@ def test_it_ends_at_the_tick_that_was_asked_for():
     "options",
     [
         {"faults": ["mocap_dropout@2.5+0.3", "imu_dropout@3.5+0.02"]},
-        {"faults": ["mavlink_delay@2.5+1"]},
-        {"faults": ["wind_gust@2.5+1.5"]},  # rises: it acts, but senses nothing
+        longer({"faults": ["mavlink_delay@2.5+1"]}),
+        longer({"faults": ["wind_gust@2.5+1.5"]}),  # rises: it acts, but senses nothing
         {"autopilot_imu": True},
         {"profile": "attitude_setpoints"},
-        {"effects": presets.laboratory()},
+        longer({"effects": presets.laboratory()}),
         {"effects": presets.laboratory(), "faults": ["imu_bias@2.5+1"]},
     ],
     ids=lambda options: "-".join(options),

@@ -103,7 +103,7 @@ def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     assert one != other
 
 
-@pytest.mark.parametrize("engine", [pytest.param("direct", marks=pytest.mark.long), "ros"])
+@pytest.mark.parametrize("engine", ["direct", pytest.param("ros", marks=pytest.mark.long)])
 def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     said = run("own_simulator.py", engine, short_scenario, tmp_path)
     found = json.loads((tmp_path / "metrics.json").read_text())

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from whole_flight import longer
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
@@ -27,11 +28,6 @@ from uam_sim_bridge.plant.effects import presets
 
 SCENARIO = load_scenario("hover")
 QUICK_PICK = load_scenario("quick_pick")
-
-
-def longer(*values):
-    """A case that `make long` flies: another moment or seed of a case that `make test` flies."""
-    return pytest.param(*values, marks=pytest.mark.long)
 
 
 def flown(*texts, seed=1, plant="calm", watch=None, scenario=SCENARIO):
@@ -98,6 +94,7 @@ def test_without_checks_of_the_grasp_the_mission_keeps_its_times(tmp_path):
     assert flight.mission.output.phase == "landed"
 
 
+@pytest.mark.long  # after the crash it is armed for half a minute
 def test_a_flight_without_a_motor_is_lost():
     _, series, figures = flown("motor_loss@hover+1:remaining=0")
     assert not figures["mission_completed"]

@@ -37,7 +37,9 @@ def test_the_next_flight_waits_for_its_end_and_is_not_ended_by_its_status(
     left_over, tmp_path, short_scenario
 ):
     domain = str(left_over.domain)
-    flight = Flight(tmp_path / "f", "--scenario", str(short_scenario), "--domain", domain)
+    flight = Flight(
+        tmp_path / "f", "--fused", "--scenario", str(short_scenario), "--domain", domain
+    )
     try:
         plant = flight.out / "logs" / "mujoco_sim.log"
         named = "one of the two nodes named mission that publish /uam/mission/status to end"

@@ -11,6 +11,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.cli.main import main
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.rebuild import rebuild
+from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 
@@ -29,14 +30,14 @@ IN_NODES = (
 def test_without_the_autopilots_voice_it_lands_by_itself(fly):
     """Setpoints still arrive, but nobody knows: no heartbeat for 3 s, then autopilot_age_land."""
     cut = "mavlink_cut@hover+0.5:direction=from_autopilot"
-    flight = fly("--scenario", "hover", "--fault", cut)
+    flight = fly("--fused", "--scenario", "hover", "--fault", cut)
     assert flight.wait() == 1
     figures = json.loads((flight.out / "metrics.json").read_text())
     passed = [(one["to"], one["cause"]) for one in figures["transitions"]]
     assert passed[-2][0] == "landing" and "no message of the autopilot for" in passed[-2][1]
     assert passed[-1] == ("disarmed", "touchdown")
     assert max(figures["max"]["position_m"]) < 0.1
-    assert "no heartbeat" in (flight.out / "logs/mavlink_bridge.log").read_text()
+    assert "no heartbeat" in (flight.out / f"logs/{wiring.FLIGHT_CONTROLLER}.log").read_text()
 
 
 @pytest.mark.slow

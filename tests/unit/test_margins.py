@@ -255,6 +255,7 @@ def test_a_torque_setpoint_is_the_law_and_no_loop_of_the_autopilot_answers(vehic
     assert rates.d[:, gyro].any() and len(rates.a)
 
 
+@pytest.mark.long  # its step is compiled for it: most of a minute
 def test_the_whole_body_law_has_the_margin_of_its_flights():
     """Its hover survives setpoints 20 ms later, with 28 ms it ends early: docs/duel.md."""
     described = load_description("t650")
