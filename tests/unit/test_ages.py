@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from uam_control import ages
 from uam_control.estimation import pose_filter
-from uam_control.estimation.pose_clock import PoseClock
+from uam_control.estimation.pose_clock import counts, new_clock
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.offboard.sequence import LINK_GAP
 from uam_control.setpoints.level_hold import HoldParameters
@@ -49,18 +49,20 @@ def test_usable_up_to_an_age_and_a_little_ahead():
 
 
 def test_poses_of_a_clock_that_jumped_back_do_not_count():
-    counts, latency = PoseClock(), 0.01
-    seen = [counts(now - latency, now, ages.BRIDGED) for now in (5.0, 5.01, 5.02)]
-    behind = [counts(now - latency - 0.2, now, ages.BRIDGED) for now in (5.03, 5.13, 5.33, 5.53)]
-    again = [counts(now - latency, now, ages.BRIDGED) for now in (5.54, 5.55)]
+    clock, latency = new_clock(), 0.01
+    seen = [counts(clock, now - latency, now, ages.BRIDGED) for now in (5.0, 5.01, 5.02)]
+    behind = [
+        counts(clock, now - latency - 0.2, now, ages.BRIDGED) for now in (5.03, 5.13, 5.33, 5.53)
+    ]
+    again = [counts(clock, now - latency, now, ages.BRIDGED) for now in (5.54, 5.55)]
     assert (seen, behind, again) == ([True] * 3, [False] * 4, [True] * 2)
 
 
 def test_poses_that_come_late_count_and_so_do_single_ones_after_an_older_one():
-    counts = PoseClock()
+    clock = new_clock()
     # (stamp, arrival): a network that is 0.2 s late from 5.0 s on, and then fast again
     late = [(4.99, 5.0), (5.0, 5.2), (5.01, 5.21), (5.3, 5.31)]
-    assert all(counts(stamp, now, ages.BRIDGED) for stamp, now in late)
+    assert all(counts(clock, stamp, now, ages.BRIDGED) for stamp, now in late)
     # one message overtakes another
-    assert counts(5.33, 5.34, ages.BRIDGED) and counts(5.32, 5.34, ages.BRIDGED)
-    assert not counts(5.2, 5.35, ages.BRIDGED) and counts(5.34, 5.35, ages.BRIDGED)
+    assert counts(clock, 5.33, 5.34, ages.BRIDGED) and counts(clock, 5.32, 5.34, ages.BRIDGED)
+    assert not counts(clock, 5.2, 5.35, ages.BRIDGED) and counts(clock, 5.34, 5.35, ages.BRIDGED)

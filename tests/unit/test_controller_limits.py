@@ -12,8 +12,8 @@ from uam_control.control.around_law import RotorLead, lead_force
 from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
+    complete_and_limit,
     complete_effort,
-    complete_force,
     integrate,
     limit_force,
     limit_torque,
@@ -140,7 +140,9 @@ def test_an_integral_of_a_quarter_holds_up_half_of_a_weight_at_half_a_unit_of_gr
     bias = np.array([0.0, 0.0, -0.25]) - integral
     tau = np.array([1.0, 0.0, 3.0]) - 2.0 * bias  # as the law writes it
     none, inertia = np.zeros(3), np.full(3, 2.0)
-    velocity, drag = np.array([2.0, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
+    reference, drag = np.zeros((3, 6)), np.array([0.5, 0.0, 0.0])
+    reference[1, 0], limited = 2.0, np.zeros(3)
     completion = ForceCompletion(drag, inertia, none, 9.0, gravity, 0.0, 0.0, 9.0, 1.0)
-    complete_force(completion, velocity, none, False, 0.1, bias, integral, tau)
-    np.testing.assert_allclose(tau, [2.0 * heavier, 0.0, 3.0 * heavier + 0.5])
+    carried = bias, integral
+    assert not complete_and_limit(reference, none, completion, False, 0.1, carried, tau, limited)
+    np.testing.assert_allclose(limited, [2.0 * heavier, 0.0, 3.0 * heavier + 0.5])

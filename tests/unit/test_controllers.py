@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.output_limits import limit_force
-from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS, label
 from uam_control.laws.errors import attitude_errors
 from uam_control.maths.rotations import matrix_from_euler
@@ -55,40 +54,6 @@ def test_rate_error_forms_differ_by_about_twice_e_cross_rate():
     error, lee = attitude((0.02, 0.01, -0.03), np.zeros(3), rate_d=rate_d)
     _, printed = attitude((0.02, 0.01, -0.03), np.zeros(3), rate_d=rate_d, printed=True)
     np.testing.assert_allclose(lee - printed, 2.0 * np.cross(error, rate_d), atol=2e-3)
-
-
-@given(st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(5, 30)), st.floats(-3, 3))
-def test_settled_attitude_reference_points_the_thrust_along_tau(tau, yaw):
-    reference = np.zeros((3, 8))
-    reference[0, 5] = yaw
-    filtered = AttitudeReference(cutoff=5.0)
-    for _ in range(400):
-        value = filtered.update(np.array(tau), reference, 0.02)
-    axis = matrix_from_euler(value[0])[:, 2]
-    np.testing.assert_allclose(axis, np.array(tau) / np.linalg.norm(tau), atol=1e-6)
-    np.testing.assert_allclose(value[1:], 0.0, atol=1e-4)
-
-
-def test_attitude_reference_rates_are_derivatives():
-    """Omega_d and its derivative against finite differences of R_d, while yawing and tilting."""
-    filtered, step = AttitudeReference(cutoff=2.0), 1e-4
-    reference = np.zeros((3, 8))
-    rotations, rates, accelerations = [], [], []
-    for k in range(3000):
-        t = k * step
-        reference[:, 5] = 0.5 * np.sin(t), 0.5 * np.cos(t), -0.5 * np.sin(t)
-        value = filtered.update(
-            np.array([3 * np.sin(2 * t), 2 * np.cos(3 * t), 20.0]), reference, step
-        )
-        rotations.append(matrix_from_euler(value[0]))
-        rates.append(value[1].copy())
-        accelerations.append(value[2].copy())
-    k = 2500
-    skew = rotations[k].T @ (rotations[k + 1] - rotations[k - 1]) / (2 * step)
-    np.testing.assert_allclose([skew[2, 1], skew[0, 2], skew[1, 0]], rates[k], atol=2e-3)
-    np.testing.assert_allclose(
-        (rates[k + 1] - rates[k - 1]) / (2 * step), accelerations[k], atol=2e-2
-    )
 
 
 @given(st.tuples(*[st.floats(-200, 200)] * 3))

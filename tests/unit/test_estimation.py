@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.pose_clock import Repeats
+from uam_control.estimation.pose_clock import no_pose, repeated
 from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler
 from uam_control.stages.estimator_stage import EstimatorStage
 
@@ -121,10 +121,10 @@ def test_a_frozen_motion_capture_is_ignored():
 
 
 def test_repeats_are_exact():
-    repeats, pose = Repeats(), (np.ones(3), np.array([1.0, 0.0, 0.0, 0.0]))
-    assert [repeats(*pose) for _ in range(3)] == [False, True, True]
-    assert not repeats(pose[0] + [0.0, 0.0, 1e-12], pose[1])
-    assert not repeats(*pose)
+    newest, pose = no_pose(), (np.ones(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    assert [repeated(*pose, newest) for _ in range(3)] == [False, True, True]
+    assert not repeated(pose[0] + [0.0, 0.0, 1e-12], pose[1], newest)
+    assert not repeated(*pose, newest)
 
 
 def test_it_is_complete_with_a_sample_of_every_sensor():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.setpoints.loop_delay import DELAYS, LoopDelay
+from uam_control.setpoints.loop_delay import DELAYS, LoopDelay, follow, pause
 from uam_control.supervision import SupervisionParameters
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger, margin_left
 
@@ -47,10 +47,16 @@ class Loop:
         return setpoint, measured
 
 
+def take(meter, stamp, setpoint, rates):
+    """Take a tick; return the value."""
+    follow(stamp, setpoint, rates, meter.sums, meter.numbers)
+    return meter.value
+
+
 def measured(loop, seconds, meter=None, begin=0.0):
     meter = meter or LoopDelay(LAG, PERIOD)
     for k in range(round(seconds / PERIOD)):
-        meter.update(begin + k * PERIOD, *loop.step())
+        take(meter, begin + k * PERIOD, *loop.step())
     return meter
 
 
@@ -87,11 +93,11 @@ def test_a_pause_and_a_gap_lose_the_value_and_not_the_next_one():
     meter, loop = LoopDelay(LAG, PERIOD), Loop(3)
     measured(loop, 3.0, meter)
     before = meter.value
-    meter.pause()
+    pause(meter.sums)
     assert math.isnan(meter.value)
     measured(loop, 1.0, meter, begin=30.0)
     assert meter.value == pytest.approx(before, abs=0.002)
-    meter.update(99.0, *loop.step())
+    take(meter, 99.0, *loop.step())
     measured(loop, 1.0, meter, begin=99.004)
     assert meter.value == pytest.approx(before, abs=0.002)
 
@@ -106,14 +112,14 @@ def test_a_body_that_turns_the_other_way_gives_no_value():
     meter, loop = LoopDelay(LAG, PERIOD), Loop(3)
     for k in range(1000):
         setpoint, rates = loop.step()
-        meter.update(k * PERIOD, -4.0 * setpoint, rates)
+        take(meter, k * PERIOD, -4.0 * setpoint, rates)
     assert math.isnan(meter.value)
 
 
 def values(loop, seconds):
     """Every value [s] of a flight, and those of its last two thirds."""
     meter = LoopDelay(LAG, PERIOD)
-    found = [meter.update(k * PERIOD, *loop.step()) for k in range(round(seconds / PERIOD))]
+    found = [take(meter, k * PERIOD, *loop.step()) for k in range(round(seconds / PERIOD))]
     return np.array(found), np.array(found[len(found) // 3 :])
 
 
@@ -169,8 +175,8 @@ def test_axes_that_contradict_each_other_give_no_value():
     meter = LoopDelay(LAG, PERIOD)
     for k in range(1000):
         (one, roll), (other, pitch) = late.step(), early.step()
-        meter.update(
-            k * PERIOD, np.array([one[0], other[1], 0.0]), np.array([roll[0], pitch[1], 0.0])
+        take(
+            meter, k * PERIOD, np.array([one[0], other[1], 0.0]), np.array([roll[0], pitch[1], 0.0])
         )
     assert math.isnan(meter.value) and meter.explained > 0.9
 
@@ -180,7 +186,7 @@ def test_a_gain_that_no_rate_loop_has_gives_no_value(gain):
     # a body that answers at once or hardly: the fit is good, but not one of a rate loop
     meter, loop = LoopDelay(LAG, PERIOD), Loop(3, gain=gain)
     for k in range(1500):
-        meter.update(k * PERIOD, *loop.step())
+        take(meter, k * PERIOD, *loop.step())
     assert math.isnan(meter.value)
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.mission import Mission, MissionParameters, StartParameters, load_scenario
+from uam_control.offboard.modes import Mode
+from uam_control.offboard.sequence import Phase
+from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
-from uam_control.supervision import Authority, State
+from uam_control.supervision import State
 from uam_control.vehicle import derived_parameters, load_description
 from uam_msgs_py.node.joins import StampJoin
 
@@ -40,7 +43,11 @@ def test_a_mission_in_flight_begins_anew_on_the_ground():
         stage.inputs.inputs.joints(stamp / SECOND, np.zeros(2))
         for subsystem in ("position", "attitude", "arm"):
             stage.inputs.inputs.gains(stamp / SECOND, subsystem, ["K0"], np.zeros(1))
-        stage.autopilot(stamp, True, armed_since, None, None, Authority())
+        armed = armed_since is not None
+        report = AutopilotReport(
+            True, Mode.OFFBOARD, armed, Phase.FLYING, (), armed_since=armed_since
+        )
+        stage.autopilot(stamp, report)
         stage.begin(stamp, state)
         stage.advance(stamp, state)
         state[:2] = np.where(mission.output.flying, mission.output.reference[:2], state[:2])

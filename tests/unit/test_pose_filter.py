@@ -7,7 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.estimation.pose_filter import EstimatedMotion, PoseFilter, correct, predict, shift
+from uam_control.estimation.pose_filter import (
+    EstimatedMotion,
+    correct,
+    correct_waiting,
+    filter_arrays,
+    parts_of,
+    predict,
+    predict_next,
+    shift,
+    wait,
+)
 from uam_control.estimation.waiting import value_at
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -109,20 +119,47 @@ def test_what_was_predicted_since_a_stamp_is_shifted():
     np.testing.assert_array_equal(poses[1], [10.0, 0.0, 0.0, *LEVEL])
 
 
-def at_rest(stamps, position=NOTHING) -> PoseFilter:
-    """A filter with bandwidths 2 and 3 rad/s that has been at rest at the stamps."""
-    found = PoseFilter(2.0, 3.0, 10.0, GRAVITY)
-    found.start(np.array(position), LEVEL)
+class Filter:
+    """A filter with bandwidths 2 and 3 rad/s whose gate refuses poses that are 10 m away."""
+
+    def __init__(self) -> None:
+        self.arrays = filter_arrays()
+        self.arrays.bandwidths[:] = 2.0, 3.0, 3.0
+        self.arrays.gate["distance"], self.arrays.numbers["gravity"] = 10.0, GRAVITY
+        self.motion, _, _ = parts_of(self.arrays.memory)
+        self.position, self.velocity, self.quaternion, *_ = self.motion
+
+    def predict(self, stamp, dt, gyro, force):
+        predict_next(self.arrays, stamp, dt, gyro, force)
+
+    def correct(self, stamp, position, quaternion):
+        wait(self.arrays, stamp, position, quaternion)
+        correct_waiting(self.arrays)
+
+    @property
+    def ahead(self) -> list:
+        """Stamp and pose of each that waits."""
+        return self.arrays.ahead[: self.arrays.numbers["waiting"].item()].tolist()
+
+    @property
+    def refused(self) -> int:
+        return self.arrays.gate["refused"].item()
+
+
+def at_rest(stamps, position=NOTHING) -> Filter:
+    """A filter that has been at rest at the stamps."""
+    found = Filter()
+    found.position[:] = position
     for stamp in stamps:
         found.predict(stamp, 0.01, NOTHING, WEIGHT)
     return found
 
 
 def test_it_begins_level_and_at_rest():
-    found = PoseFilter(2.0, 3.0, 10.0, GRAVITY)
-    np.testing.assert_array_equal(found.quaternion, LEVEL)
-    vectors = found.position, found.velocity, found.rates, found.acceleration, found.gyro_bias
-    np.testing.assert_array_equal([*vectors, found.accelerometer_bias], np.zeros((6, 3)))
+    motion = Filter().motion
+    np.testing.assert_array_equal(motion.quaternion, LEVEL)
+    rest = motion._replace(quaternion=NOTHING)
+    np.testing.assert_array_equal(rest, np.zeros((7, 3)))
 
 
 def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_ms():
@@ -190,7 +227,7 @@ def test_poses_of_a_clock_that_is_ahead_are_refused_until_it_is_right_again(befo
         place[1] = 1e-6 * tick  # no repeat
         found.predict(now, 0.004, NOTHING, WEIGHT)
         found.correct(now + (before if tick <= 50 else step), place, LEVEL)
-    assert found.gate.refused > 300 and not found.ahead and found.position[0] == 0.0
+    assert found.refused > 300 and not found.ahead and found.position[0] == 0.0
     found.predict(2.004, 0.004, NOTHING, WEIGHT)
     found.correct(2.004, place, LEVEL)
     assert found.position[0] > 0.0
@@ -202,7 +239,7 @@ def test_poses_that_came_while_the_imu_paused_are_used_with_its_samples():
         found.correct(stamp, np.array([0.1, 0.0, 1e-6 * stamp]), LEVEL)
     for stamp in np.arange(0.004, 0.2, 0.004):
         found.predict(stamp, 0.004, NOTHING, WEIGHT)
-    assert not found.gate.refused and not found.ahead and found.position[0] > 0.05
+    assert not found.refused and not found.ahead and found.position[0] > 0.05
 
 
 @pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])
@@ -221,7 +258,7 @@ def test_a_pose_up_to_a_second_late_is_used_and_the_later_the_slower_it_corrects
         w = min(2.0, 1.5 / late) if late else 2.0
         expected = 0.05 * (3.0 * w + 3.0 * w**2 * late) * (share > 0.0)
         assert found.position[0] == pytest.approx(expected)
-        assert found.gate.refused == (share == 0.0)
+        assert found.refused == (share == 0.0)
 
 
 def test_a_repeated_pose_is_used_once():
@@ -242,13 +279,13 @@ def test_a_pose_later_than_30_ms_corrects_the_predictions_since():
     turned = np.array([math.cos(0.18), 0.6 * half, 0.8 * half, 0.0])
     np.testing.assert_allclose(found.quaternion, turned)
     # poses that agree with the shifted predictions change nothing: .15 + .01*.3 at .02 s
-    before = found.velocity.copy(), found.gyro_bias.copy()
+    before = found.velocity.copy(), found.motion.gyro_bias.copy()
     for stamp, x in ((0.02, 0.153), (0.04, 0.159), (0.01, 0.15)):
         found.correct(stamp, np.array([x, 0.0, 0.0]), turned)
     found.correct(0.0, NOTHING, LEVEL)  # nor does one before the correction
     np.testing.assert_allclose(found.position, [0.162, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(found.velocity, before[0], atol=1e-12)
-    np.testing.assert_allclose(found.gyro_bias, before[1], atol=1e-12)
+    np.testing.assert_allclose(found.motion.gyro_bias, before[1], atol=1e-12)
     np.testing.assert_allclose(found.quaternion, turned, atol=1e-12)
 
 
@@ -263,10 +300,10 @@ def test_a_pose_of_30_ms_does_not():
 def test_other_bandwidths_from_the_next_pose_on():
     found = at_rest([0.0], (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(found.position, [1.0, 2.0, 3.0])
-    found.set_bandwidths(4.0, 1.0)
+    found.arrays.bandwidths[:] = 4.0, 1.0, 4.0
     found.correct(0.0, np.array([2.0, 2.0, 3.0]), TURNED)
     # 3*4*.05, 3*16*.05, 64*.05; attitude 1*.05*(.72, .96, 0)
     np.testing.assert_allclose(found.position, [1.6, 2.0, 3.0])
     np.testing.assert_allclose(found.velocity, [2.4, 0.0, 0.0])
-    np.testing.assert_allclose(found.accelerometer_bias, [-3.2, 0.0, 0.0])
-    np.testing.assert_allclose(found.gyro_bias, [-0.036, -0.048, 0.0])
+    np.testing.assert_allclose(found.motion.accelerometer_bias, [-3.2, 0.0, 0.0])
+    np.testing.assert_allclose(found.motion.gyro_bias, [-0.036, -0.048, 0.0])

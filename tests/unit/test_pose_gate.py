@@ -9,19 +9,34 @@ from hypothesis import strategies as st
 
 from uam_control.ages import REJECTED
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.pose_clock import PoseGate
+from uam_control.estimation.pose_clock import new_gate, rejects, settled, suspend
 
 PERIOD, TICK = 0.008, 0.004
 LEVEL, WEIGHT = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81])
 
 
-def refusals(gate: PoseGate, distances: list[float], bias: float = 0.0, begin: float = 0.0):
+class Gate:
+    """A gate that rejects poses more than 0.4 m away."""
+
+    def __init__(self) -> None:
+        self.memory = new_gate()
+        self.memory["distance"] = 0.4
+
+    def __call__(self, stamp: float, distance: float, bias: float) -> bool:
+        return rejects(self.memory, stamp, distance, bias, REJECTED)
+
+    @property
+    def refused(self) -> int:
+        return self.memory["refused"].item()
+
+
+def refusals(gate: Gate, distances: list[float], bias: float = 0.0, begin: float = 0.0):
     return [gate(begin + PERIOD * k, d, bias) for k, d in enumerate(distances)]
 
 
-def after_a_while() -> PoseGate:
+def after_a_while() -> Gate:
     """Return a gate after poses until 0 s, long enough for it to be active."""
-    gate = PoseGate(0.4)
+    gate = Gate()
     assert not any(refusals(gate, [0.0] * 200, begin=-200 * PERIOD))
     return gate
 
@@ -32,7 +47,7 @@ def test_only_poses_far_from_the_estimate_are_rejected_and_counted():
     assert gate.refused == 3
 
 
-def answers(gate: PoseGate, poses: list[tuple[float, float]], bias: float = 0.0) -> list[bool]:
+def answers(gate: Gate, poses: list[tuple[float, float]], bias: float = 0.0) -> list[bool]:
     """Return the gate's results for (stamp [s], distance [m])."""
     return [gate(stamp, distance, bias) for stamp, distance in poses]
 
@@ -43,13 +58,13 @@ def quarters(begin: float, end: float) -> list[tuple[float, float]]:
 
 
 def test_the_estimate_is_trusted_when_poses_have_come_for_more_than_a_second():
-    gate = PoseGate(0.4)
+    gate = Gate()
     assert not any(answers(gate, [*quarters(0.0, 1.0), (1.0, 0.5)]))
     assert answers(gate, [(1.25, 0.4), (1.25, 0.5)]) == [False, True]
 
 
 def test_a_gap_of_more_than_half_a_second_ends_the_trust():
-    gate = PoseGate(0.4)
+    gate = Gate()
     answers(gate, quarters(0.0, 2.0))  # the last one at 1.75 s
     assert answers(gate, [(2.25, 0.5), (3.0, 0.5), (3.5, 0.5)]) == [True, False, False]
     assert answers(gate, [(4.0, 0.0), (4.25, 0.5)]) == [False, True]  # more than 1 s after 3 s
@@ -57,26 +72,27 @@ def test_a_gap_of_more_than_half_a_second_ends_the_trust():
 
 @pytest.mark.parametrize(("bias", "refused"), [(1.0, True), (1.5, False)])
 def test_a_bias_of_more_than_1_m_per_s2_ends_the_trust(bias, refused):
-    gate = PoseGate(0.4)
+    gate = Gate()
     answers(gate, quarters(0.0, 2.0))
     assert answers(gate, [(2.0, 0.5)], bias) == [refused]
-    gate = PoseGate(0.4)  # a bias that grows during a rejection does not end it
+    gate = Gate()  # a bias that grows during a rejection does not end it
     answers(gate, quarters(0.0, 2.0))
     assert answers(gate, [(2.0, 0.5)]) + answers(gate, [(2.25, 0.5)], bias) == [True, True]
 
 
 def test_biases_are_unsettled_for_a_second_after_a_gap_but_not_by_a_contradiction():
-    gate = PoseGate(0.4)
+    gate = Gate()
     answers(gate, quarters(0.0, 2.0))
-    assert not gate.settled(1.0) and gate.settled(1.25)  # the start is the end of a gap
+    # the start is the end of a gap
+    assert not settled(gate.memory, 1.0) and settled(gate.memory, 1.25)
     answers(gate, [(2.0, 0.0)], bias=1.5)
-    assert gate.settled(2.0)
-    gate.suspend(2.25)  # a gap of the IMU
-    assert not gate.settled(3.25) and gate.settled(3.5)
+    assert settled(gate.memory, 2.0)
+    suspend(gate.memory, 2.25)  # a gap of the IMU
+    assert not settled(gate.memory, 3.25) and settled(gate.memory, 3.5)
 
 
 def test_poses_are_refused_for_ten_seconds_and_then_followed_for_more_than_one():
-    gate = PoseGate(0.4)
+    gate = Gate()
     answers(gate, quarters(0.0, 2.0))
     far = [(stamp, 0.5) for stamp, _ in quarters(2.0, 14.0)]
     # refused from 2 to 12 s, used from 12.25 to 13.25 s (five), then refused again
@@ -96,7 +112,7 @@ def test_no_rejection_after_a_gap_of_poses_or_imu():
     assert gate(0.3, 0.7, 0.0)
     assert not any(gate(1.0 + PERIOD * k, 0.7, 0.0) for k in range(100))
     gate = after_a_while()
-    gate.suspend(0.0)
+    suspend(gate.memory, 0.0)
     assert not any(gate(PERIOD * k, 0.7, 0.0) for k in range(100))
     assert gate(1.1, 0.7, 0.0)
 
@@ -104,7 +120,7 @@ def test_no_rejection_after_a_gap_of_poses_or_imu():
 @given(st.lists(st.floats(0.0, 10.0), min_size=400, max_size=400), st.floats(0.05, 10.0))
 def test_no_rejection_is_longer_than_its_limit(distances, limit):
     gate = after_a_while()
-    gate.distance = limit
+    gate.memory["distance"] = limit
     refused = answers(gate, [(0.04 * k, distance) for k, distance in enumerate(distances)])
     longest = round(REJECTED / 0.04) + 1
     assert all(not all(refused[k : k + longest + 1]) for k in range(len(refused) - longest))

@@ -13,6 +13,7 @@ from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.targets import AttitudeTarget, VisionPose
+from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
@@ -27,7 +28,6 @@ from uam_control.stages.supervisor_inputs import (
 )
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
-from uam_control.supervision import Authority
 from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -153,7 +153,7 @@ def test_messages_of_stages_are_read_as_those_of_other_processes():
         put.put(MOCAP, stamp, way, LEVEL)
         kept.keep("mocap", kept.mocap, (stamp, way, LEVEL))
         put.put(JOINTS, stamp, effort)
-        kept.keep("joints", kept.joints, (stamp, effort, effort, effort))
+        kept.keep("joints", kept.inputs.joints, (now, effort))
         put.put(PAYLOAD, stamp, 2.0 * way)
         kept.keep("payload", kept.payload, (stamp, 2.0 * way, LEVEL))
         put.put(BIAS, stamp, 0.1 * way)
@@ -206,7 +206,10 @@ def test_each_tick_has_one_reference_carried_to_its_stamp(step):
 
 def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
     stage, state = mission_stage(), np.zeros((3, 8))
-    stage.autopilot(0, True, 0, 0.01, 0.02, Authority("the pilot, in HOLD"))
+    known = {"armed_since": 0, "round_trip": 0.01, "loop_delay": 0.02}
+    held = Phase.RELEASED, (), "the pilot, in HOLD"
+    report = AutopilotReport(True, Mode.HOLD, True, *held, **known)
+    stage.autopilot(0, report)
     stage.begin(0, state)
     assert np.isnan(stage.inputs.readings.autopilot_age)
     stage.begin(PERIOD, state)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.stages.tick_stamps import LONG, TickStamps, serves
+from uam_control.stages.tick_stamps import LONG, TickStamps, follows, next_stamp, serves
 from uam_msgs_py.node.joins import Ahead, StampJoin
 
 PERIOD = 4_000_000
@@ -16,7 +16,8 @@ MS = 1_000_000
 
 def ticks_of(samples):
     ticks = TickStamps(PERIOD)
-    return [ticks.next(stamp) for stamp in samples if ticks.follows(stamp)], ticks
+    memory, window = ticks.memory, ticks.window
+    return [next_stamp(memory, window, one) for one in samples if follows(memory, one)], ticks
 
 
 @given(st.integers(0, 10**12), st.lists(st.integers(1, 9), max_size=60))
@@ -68,9 +69,9 @@ def test_after_a_long_pause_ticks_begin_anew():
 
 def test_an_older_sample_starts_no_tick_and_is_not_a_repeated_one():
     ticks = TickStamps(PERIOD)
-    ticks.next(10 * PERIOD)
-    assert not ticks.follows(8 * PERIOD) and ticks.repeated == 0
-    assert not ticks.follows(10 * PERIOD) and ticks.repeated == 1
+    next_stamp(ticks.memory, ticks.window, 10 * PERIOD)
+    assert not follows(ticks.memory, 8 * PERIOD) and ticks.repeated == 0
+    assert not follows(ticks.memory, 10 * PERIOD) and ticks.repeated == 1
 
 
 def test_a_reference_of_a_missing_tick_is_no_lost_tick():

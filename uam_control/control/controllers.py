@@ -54,7 +54,8 @@ AT_REST = 1e-4  # [m/s] velocity of the reference in the first ticks of a take-o
 class Controller:
     """Base of the three controllers: errors of the whole vehicle, one law, its saturation.
 
-    `adaptation` (len(names),): the law's published gains; `names`: their names.
+    `parameters`: in use; `adaptation` (len(names),): the law's published gains; `names`: their
+    names; `errors` (3, 6 + n): rows e, e_dot, chi_d_ddot of the last tick, see `tracking_errors`;
     `saturated`: whether a limit changed the output of the last tick; `flying`: whether the law has
     begun; `arrays`: all that compiled functions use, made anew with the parameters.
     """
@@ -63,18 +64,14 @@ class Controller:
     saturated, flying = Flag(), Flag()
 
     def __init__(self, parameters: LawParameters) -> None:
-        self.law, self._parameters = catalogue.law(parameters.law)(parameters), parameters
+        self.law, self.parameters = catalogue.law(parameters.law)(parameters), parameters
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
         self.memory = record(WHOLE, REAL)
-        self._errors = np.zeros((3, ALPHA))
-        self._norms, self._tau = np.zeros(3), np.zeros(len(parameters.inertia))
+        self.errors = np.zeros((3, ALPHA))
+        self._norms, axes = np.zeros(3), len(parameters.inertia)
+        self._tau, self._integral = np.zeros(axes), np.zeros(axes)
         self.set_parameters(parameters)
-
-    @property
-    def parameters(self) -> LawParameters:
-        """The parameters in use."""
-        return self._parameters
 
     def set_parameters(self, parameters: LawParameters) -> None:
         """Use `parameters` (validated) from the next tick on; the adapted gains stay.
@@ -85,15 +82,15 @@ class Controller:
         if parameters.law != flying:
             raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
         self.law.set_parameters(parameters)
-        self._parameters = parameters
+        self.parameters = parameters
         self.memory["frozen"] = self.law.frozen
         self.memory["printed"] = parameters.error_rate_form == "printed"
         self._make_arrays()
 
     def _make_arrays(self) -> None:
         """Make `arrays`, and prepare the functions that use them."""
-        self._own = tuple(self._errors[:, self.columns])
-        of_all = self.law.arrays, self._errors, self._own, self._norms, self._tau, self.memory
+        self._own = tuple(self.errors[:, self.columns])
+        of_all = self.law.arrays, self.errors, self._own, self._norms, self._tau, self.memory
         self.arrays = self._arrays(ControllerArrays(*of_all))
 
     def _arrays(self, of_all: ControllerArrays) -> tuple:
@@ -106,42 +103,31 @@ class Controller:
         self._forget()
 
     def _forget(self) -> None:
-        """Set what the vehicle carries to zero: the law's bias."""
-        self.law.bias[:] = 0.0
-
-    @property
-    def errors(self) -> np.ndarray:
-        """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick; see `tracking_errors`."""
-        return self._errors
+        """Set what the vehicle carries to zero."""
+        self.law.bias[:] = self._integral[:] = 0.0
 
     def _fit(self, state: np.ndarray) -> None:
         """Allocate the errors for the shape of `state`, which the first tick tells."""
-        if state.shape != self._errors.shape:
-            self._errors = np.zeros(state.shape)
+        if state.shape != self.errors.shape:
+            self.errors = np.zeros(state.shape)
             self._make_arrays()
 
     def enter(self, state: np.ndarray, reference: np.ndarray) -> bool:
         """Note a tick in flight; state, reference: (3, 6 + n), see `coordinates`.
 
-        Returns whether the law begins with it in flight, see `_handed_back`.
+        Returns whether the law begins with it in flight: with the vehicle's velocity, and what the
+        vehicle carries, the weight of a payload or the wind. On the ground that is forgotten: the
+        reference is at rest, and nearly so if the first tick of a take-off was lost.
         """
         self._fit(state)
-        return self._handed_back(reference)
+        begins, self.flying = not self.flying, True
+        moves = bool(np.max(np.abs(reference[CHI_DOT, POSITION])) > AT_REST)
+        if begins and not moves:
+            self._forget()
+        return begins and moves
 
     def _run_law(self, dt: float) -> None:
         self.law.update(*self._own, self._norms, self.saturated, dt)
-
-    def _handed_back(self, reference: np.ndarray) -> bool:
-        """Return whether this first tick of the law since `_idle` is one in flight.
-
-        What the vehicle carries, the weight of a payload or the wind, is then still there. On the
-        ground it is forgotten.
-        """
-        begins, self.flying = not self.flying, True
-        in_flight = begins and _in_flight(reference)
-        if begins and not in_flight:
-            self._forget()
-        return in_flight
 
     def _idle(self) -> np.ndarray:
         """Reset the law; return its output, zero."""
@@ -152,19 +138,21 @@ class Controller:
 
 
 class PositionController(Controller):
-    """tau_p, eq. (8), ct1, and the desired attitude, which points the thrust along tau_p."""
+    """tau_p, eq. (8), ct1, and the desired attitude, which points the thrust along tau_p.
+
+    `attitude_reference`: see `AttitudeReference.value`.
+    """
 
     columns = POSITION
 
     def __init__(self, parameters: PositionLimits) -> None:
-        self._attitude = AttitudeReference(parameters.attitude_cutoff)
-        self._integral = np.zeros(3)
+        self._attitude = AttitudeReference()
+        self.attitude_reference = self._attitude.value
         self._made = np.full(1, math.nan)  # thrust of the rotors, see `RotorLead`
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> PositionArrays:
-        p, desired = self._parameters, self._attitude
-        desired.cutoff = cutoff = p.attitude_cutoff
+        p, desired = self.parameters, self._attitude
         mass = p.gravity_feedforward_mass
         completion = ForceCompletion(
             mass * np.array(p.drag_feedforward),
@@ -177,24 +165,15 @@ class PositionController(Controller):
             float(p.thrust_max),
             float(p.tilt_max),
         )
-        filtered = float(cutoff), desired.filter, desired.lead, desired.value
+        filtered = float(p.attitude_cutoff), desired.filter, desired.lead, desired.value
         carried = self.law.bias, self._integral
         rotors = RotorLead(float(p.rotor_lag), float(p.thrust_response), self._made)
         turning = p.bias_frame == HEADING
         arrays = PositionArrays(of_all, completion, carried, rotors, turning, *filtered)
-        rows = self._errors
+        rows = self.errors
         self._begin = bound(begin_law, of_all, rows, rows, desired.value, True)
         self._end = bound(end_position, arrays, rows, 0.0)
         return arrays
-
-    @property
-    def attitude_reference(self) -> np.ndarray:
-        """Rows q_d [rad], Omega_d, Omega_d_dot (3, 3); see `AttitudeReference.value`."""
-        return self._attitude.value
-
-    def _forget(self) -> None:
-        super()._forget()
-        self._integral[:] = 0.0
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
@@ -210,7 +189,7 @@ class PositionController(Controller):
             return self._idle()
         if self.enter(state, reference):
             self._attitude.begin(state, reference)
-        self._begin(state, reference, self._attitude.value, True)
+        self._begin(state, reference, self.attitude_reference, True)
         self._run_law(dt)
         self._end(reference, dt)
         return self._tau
@@ -234,7 +213,7 @@ class AttitudeController(Controller):
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> AttitudeArrays:
-        p, now = self._parameters, self.prediction
+        p, now = self.parameters, self.prediction
         now["counts"], now["nominal"] = p.prediction_measured, p.prediction_nominal
         now["prediction"] = p.prediction
         self.measured(now["measured"].item())
@@ -244,7 +223,7 @@ class AttitudeController(Controller):
             *(RATE_REFERENCES.index(p.rate_reference), p.load_from == STATE),
             *(np.array(p.torque_max, dtype=float), now),
         )
-        rows = self._errors
+        rows = self.errors
         self._begin = bound(begin_attitude, arrays, rows, rows, np.zeros((3, 3)), 0.0)
         self._end = bound(end_attitude, arrays)
         return arrays
@@ -289,7 +268,6 @@ class ArmController(Controller):
     def __init__(self, parameters: ArmLimits) -> None:
         joints = len(parameters.inertia)
         self._hold = SampleHold(parameters.goal_rate)
-        self._integral = np.zeros(joints)
         self._still = still_joints(joints)
         # goals do not exist before the first tick
         to_goals = parameters.setpoint == POSITION_SERVO
@@ -297,7 +275,7 @@ class ArmController(Controller):
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> ArmArrays:
-        p, self._hold.rate = self._parameters, self._parameters.goal_rate
+        p, self._hold.rate = self.parameters, self.parameters.goal_rate
         to_goals = p.setpoint == POSITION_SERVO
         if not to_goals:
             self.command = self._tau
@@ -308,15 +286,11 @@ class ArmController(Controller):
             *(self.command, to_goals, p.goal_from == REFERENCE, float(p.goal_compliance)),
             *(self._hold.memory, self._still),
         )
-        rows = self._errors
+        rows = self.errors
         self._begin = bound(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)
         self._let_go = bound(let_go, arrays, rows, rows)
         self._end = bound(end_arm, arrays, rows, rows, 0.0)
         return arrays
-
-    def _forget(self) -> None:
-        super()._forget()
-        self._integral[:] = 0.0
 
     @property
     def stuck(self) -> list[int]:
@@ -341,12 +315,3 @@ class ArmController(Controller):
         self._run_law(dt)
         self._end(state, reference, dt)
         return self._tau
-
-
-def _in_flight(reference: np.ndarray) -> bool:
-    """Return whether a law begins with a vehicle in flight, which somebody hands back.
-
-    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest,
-    and nearly so if the first tick of a take-off was lost.
-    """
-    return bool(np.max(np.abs(reference[CHI_DOT, POSITION])) > AT_REST)

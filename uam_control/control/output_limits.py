@@ -268,7 +268,7 @@ def integrate(
 
 
 class ForceCompletion(NamedTuple):
-    """What `complete_force` and `limit_force` need besides the tick's values; see there.
+    """What `complete_and_limit` needs besides the tick's values; limits: see `limit_force`.
 
     drag (3,) [N s/m]; inertia (3,) [kg]; integral_gain, integral_limit: see `integrate`.
     integral_gravity [m/s^2]: gravity, 0: what is carried does not count as weight.
@@ -286,31 +286,6 @@ class ForceCompletion(NamedTuple):
 
 
 @borrowing
-def complete_force(
-    c: ForceCompletion,
-    velocity_d: np.ndarray,
-    e: np.ndarray,
-    saturated: bool,
-    dt: float,
-    bias: np.ndarray,
-    integral: np.ndarray,
-    tau: np.ndarray,
-) -> None:
-    """Add drag and integral action to the law's force tau (3,) [N, ENU], in place.
-
-    velocity_d (3,) [m/s]; bias (3,) [m/s^2]: of the law, part of tau; e, saturated, dt, integral:
-    see `integrate`. What bias and integral hold up is weight, so the rest of the force is for that
-    mass, too.
-    """
-    integrate(e, c.integral_gain, c.integral_limit, saturated, dt, integral)
-    carried = integral[Z] + bias[Z]
-    heavier = 1.0 - carried / c.integral_gravity if c.integral_gravity > 0.0 else 1.0
-    for i in range(len(tau)):
-        own = tau[i] + c.inertia[i] * bias[i] + c.drag[i] * velocity_d[i]
-        tau[i] = own * heavier - c.inertia[i] * (integral[i] + bias[i])
-
-
-@borrowing
 def complete_and_limit(
     reference: np.ndarray,
     e: np.ndarray,
@@ -321,13 +296,20 @@ def complete_and_limit(
     tau: np.ndarray,
     limited: np.ndarray,
 ) -> bool:
-    """Complete the law's force tau (3,), write it within its limits to limited (3,), both [N, ENU].
+    """Add drag and integral action to the law's force tau (3,), write it within its limits to
+    limited (3,), both [N, ENU]; return whether a limit acted.
 
-    reference (3, 6 + n): see `coordinates`; carried: bias and integral; the others: see
-    `complete_force`. Returns whether a limit acted.
+    reference (3, 6 + n): see `coordinates`; carried: bias (3,) [m/s^2] of the law, part of tau, and
+    integral; e, saturated, dt: see `integrate`. What bias and integral hold up is weight, so the
+    rest of the force is for that mass, too.
     """
-    velocity_d = reference[CHI_DOT, X:ROLL]
-    complete_force(c, velocity_d, e, saturated, dt, carried[0], carried[1], tau)
+    bias, integral = carried
+    integrate(e, c.integral_gain, c.integral_limit, saturated, dt, integral)
+    held = integral[Z] + bias[Z]
+    heavier = 1.0 - held / c.integral_gravity if c.integral_gravity > 0.0 else 1.0
+    for i in range(len(tau)):
+        own = tau[i] + c.inertia[i] * bias[i] + c.drag[i] * reference[CHI_DOT, X + i]
+        tau[i] = own * heavier - c.inertia[i] * (integral[i] + bias[i])
     return limit_force(tau, c.weight, c.thrust_min, c.thrust_max, c.tilt_max, limited)
 
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, X, Y, Z
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
 from uam_control.maths.rotations import body_rates, thrust_attitude
 from uam_control.maths.vectors import Vector, cross, dot, minus, plus, times
 
@@ -29,16 +29,10 @@ class AttitudeReference:
     state of `attitude_reference_step`.
     """
 
-    def __init__(self, cutoff: float) -> None:
-        """cutoff: corner frequency of the filter on the correction [Hz]."""
-        self.cutoff = cutoff
+    def __init__(self) -> None:
         self.value = np.zeros((3, 3))
         self.filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
         self.lead = np.zeros(2)  # of roll, pitch [rad]
-        self._step = prepared(
-            *(attitude_reference_step, self.lead, self.value, 0.0, 0.0),
-            *(self.filter, self.lead, self.value),
-        )
 
     def reset(self, yaw: float) -> None:
         """Set the desired attitude to level at `yaw` [rad], with zero rates."""
@@ -62,15 +56,6 @@ class AttitudeReference:
         self.filter[:, RATE] -= reference[CHI_DOT, ROLL:YAW]
         self.lead[:] = math.nan
 
-    def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
-        """Advance by dt [s] and return `value` (3, 3).
-
-        tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives roll, pitch, yaw and their
-        derivatives.
-        """
-        self._step(tau_p, reference, self.cutoff, dt, self.filter, self.lead, self.value)
-        return self.value
-
 
 @borrowing
 def attitude_reference_step(
@@ -84,9 +69,10 @@ def attitude_reference_step(
 ) -> None:
     """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3).
 
-    tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
-    roll, pitch: angle [rad], rate [rad/s] of the correction; lead: (2,), of roll and pitch [rad],
-    added to the input; NaN: see `AttitudeReference.begin`.
+    tau_p (3,) [N, ENU], z > 0; reference (3, 6 + n): gives roll, pitch, yaw and their derivatives;
+    cutoff [Hz]: corner of the filter; dt [s]; filtered (2, 2): rows roll, pitch: angle [rad], rate
+    [rad/s] of the correction; lead (2,): of roll and pitch [rad], added to the input; NaN: see
+    `AttitudeReference.begin`.
     """
     yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
     yaw_acceleration = reference[CHI_DDOT, YAW]

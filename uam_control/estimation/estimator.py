@@ -19,9 +19,9 @@ from uam_control.estimation.pose_clock import settled, suspend
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     FilterArrays,
-    PoseFilter,
     begin_anew,
     correct_waiting,
+    filter_arrays,
     parts_of,
     predict_next,
     wait,
@@ -38,7 +38,7 @@ READINGS = 16  # of the joints, that wait for the end of their tick at most
 
 
 class EstimatorArrays(NamedTuple):
-    """State of a `StateEstimator`: of its `PoseFilter`; memory: see `arrays_of`; readings
+    """State of a `StateEstimator`: of its filter of poses; memory: see `arrays_of`; readings
     (READINGS, 1 + 2 n): stamp, angles and velocities of those that wait, in order; numbers (1,):
     see WHOLE, REAL."""
 
@@ -70,12 +70,10 @@ class StateEstimator(Estimator):
     kind = EstimatorParameters
 
     def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
-        """joints: how many the arm has."""
-        p = parameters
-        self._pose = PoseFilter(p.position_bandwidth, p.attitude_bandwidth, p.pose_gate, p.gravity)
         self.memory = record(WHOLE, REAL)
-        memory, readings = np.zeros(memory_size(joints)), np.zeros((READINGS, 1 + 2 * joints))
-        self.arrays = EstimatorArrays(self._pose.arrays, memory, readings, self.memory)
+        memory = np.zeros(FIXED + PER_JOINT * joints)
+        readings = np.zeros((READINGS, 1 + 2 * joints))
+        self.arrays = EstimatorArrays(filter_arrays(), memory, readings, self.memory)
         self.set_parameters(parameters)
         forget_samples(self.arrays)
         self._state, *_ = arrays_of(self.arrays.memory)
@@ -87,12 +85,11 @@ class StateEstimator(Estimator):
         self._settle, self._assemble = (prepared(f, a) for f in (settle, assemble_stored))
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
-        """Use `parameters` (validated) from the next sample on."""
         self.parameters = p = parameters
-        self._pose.set_bandwidths(p.position_bandwidth, p.attitude_bandwidth)
-        self._pose.gate.distance = p.pose_gate
-        self._pose.gravity = p.gravity
-        m = self.memory[0]
+        pose, m = self.arrays.pose, self.memory[0]
+        bandwidths = p.position_bandwidth, p.attitude_bandwidth
+        pose.bandwidths[:] = *bandwidths, max(bandwidths)
+        pose.gate["distance"], pose.numbers["gravity"] = p.pose_gate, p.gravity
         m.angular_cutoff, m.linear_cutoff = p.angular_acceleration_cutoff, p.acceleration_cutoff
         m.joint_bandwidth, m.velocity_weight = p.joint_bandwidth, p.joint_velocity_weight
         m.observed, m.observer_bandwidth = p.joint_velocity == OBSERVER, p.joint_observer_bandwidth
@@ -100,50 +97,36 @@ class StateEstimator(Estimator):
 
     @property
     def refused_poses(self) -> int:
-        """Return the number of poses rejected because of a jump."""
         self._settle(self.arrays)
-        return self._pose.gate.refused
+        return self.arrays.pose.gate["refused"].item()
 
     @property
     def complete(self) -> bool:
-        """See `complete`."""
         return complete(self.arrays)
 
     def forget(self) -> None:
-        """See `forget_samples`."""
         forget_samples(self.arrays)
 
     @property
-    def quaternion(self) -> np.ndarray:
-        """Return the attitude quaternion (4,), body → world [w x y z]."""
-        return self._pose.quaternion
-
-    @property
     def bias_known(self) -> bool:
-        """See `bias_known`."""
         return bias_known(self.arrays)
 
     @property
     def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the estimated biases (3,) of gyroscope [rad/s] and accelerometer [m/s^2], FLU."""
         found = np.empty((2, 3))
         self._write_biases(self.arrays.pose.memory, found)
         return found[0], found[1]
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """See `take_mocap`."""
         self._mocap(self.arrays, stamp, position, quaternion)
 
     def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
-        """See `take_imu`."""
         self._imu(self.arrays, stamp, gyro, specific_force)
 
     def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """See `take_joints`."""
         self._joints(self.arrays, stamp, alpha, alpha_dot)
 
     def update(self) -> np.ndarray:
-        """Return the state (3, 6 + n) at the newest IMU stamp; the next call reuses the array."""
         self._settle(self.arrays)
         self._assemble(self.arrays)
         return self._state
@@ -153,11 +136,6 @@ FIXED = 27  # numbers of an estimator's memory without joints
 PER_JOINT = 7
 
 
-def memory_size(joints: int) -> int:
-    """Return the length of an estimator's memory, see `arrays_of`."""
-    return FIXED + PER_JOINT * joints
-
-
 @jit
 def arrays_of(
     memory: np.ndarray,
@@ -165,7 +143,7 @@ def arrays_of(
     """Return state (3, 6 + n), joints (2, n): angles [rad] and velocities [rad/s], and the filters:
     of the joints (2, n), of the body rates (2, 3), of the acceleration (3,).
 
-    They are views of memory, see `memory_size`: a call passes one array instead of five.
+    They are views of memory, FIXED + PER_JOINT n numbers: a call passes one array instead of five.
     """
     n = (len(memory) - FIXED) // PER_JOINT
     size, two = ALPHA + n, 2 * n

@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from uam_control.ages import AHEAD, AHEAD_FOR, REJECTED, UNAIDED, usable
-from uam_control.maths.compiled import borrowing, prepared
-from uam_control.maths.memory import Number, record
+from uam_control.ages import AHEAD, AHEAD_FOR, UNAIDED, usable
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
 
 # newest [s]: stamp of the newest pose that counted, age [s]: of that at its arrival; ahead_since
 # [s]: stamp of the IMU since which every pose is far ahead, inf: the last one was not
@@ -25,21 +25,14 @@ WHOLE, REAL = "behind", "newest age ahead_since"
 POSITION, POSE = 3, 7
 CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
 MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
-# stamps [s]; rejecting_since: NaN while no pose is rejected
+# distance [m]: from the estimate, above which a pose is rejected; stamps [s]; rejecting_since: NaN
+# while no pose is rejected
 GATE = "distance suspended last interrupted rejecting_since"
 
 
-class Repeats:
-    """Compares each pose with the last one; newest (7,): position and quaternion of that."""
-
-    def __init__(self) -> None:
-        self.newest = np.full(POSE, math.nan)
-        still, level = np.zeros(3), np.zeros(4)
-        self._repeated = prepared(repeated, still, level, self.newest)
-
-    def __call__(self, position: np.ndarray, quaternion: np.ndarray) -> bool:
-        """Return whether position (3,) and quaternion (4,) equal those of the last call exactly."""
-        return self._repeated(position, quaternion, self.newest)
+def no_pose() -> np.ndarray:
+    """Return position and quaternion (7,) of the newest pose before the first: NaN."""
+    return np.full(POSE, math.nan)
 
 
 @borrowing
@@ -58,21 +51,16 @@ def repeated(position: np.ndarray, quaternion: np.ndarray, newest: np.ndarray) -
     return same
 
 
-class PoseClock:
-    """Decides for each pose, in order of arrival, whether its stamp counts."""
-
-    def __init__(self) -> None:
-        self.memory = record(WHOLE, REAL)
-        forget_clock(self.memory)
-
-    def __call__(self, stamp: float, now: float, oldest: float) -> bool:
-        """See `counts`."""
-        return counts(self.memory, stamp, now, oldest)
+def new_clock() -> np.ndarray:
+    """Return the memory (1,) of the clock of poses, see `counts`."""
+    clock = record(WHOLE, REAL)
+    forget_clock(clock)
+    return clock
 
 
 @borrowing
 def forget_clock(clock: np.ndarray) -> None:
-    """Know no pose; clock (1,): memory of a `PoseClock`."""
+    """Know no pose; clock (1,): see `new_clock`."""
     m = clock[0]
     m.behind = False
     m.newest = -math.inf
@@ -81,7 +69,7 @@ def forget_clock(clock: np.ndarray) -> None:
 
 @borrowing
 def counts(clock: np.ndarray, stamp: float, now: float, oldest: float) -> bool:
-    """Return whether a pose of `stamp` [s] counts at `now` [s]; clock: see `forget_clock`.
+    """Return whether a pose of `stamp` [s] counts at `now` [s]; clock: see `new_clock`.
 
     It is `usable` up to an age of `oldest` [s]. After stamps that went back no pose counts
     until one is about as young as the last that did.
@@ -109,33 +97,16 @@ def waits(clock: np.ndarray, stamp: float, newest: float) -> bool:
     return newest - m.ahead_since <= AHEAD_FOR
 
 
-class PoseGate:
-    """Decides for each pose whether to reject it; `refused`: number of rejected poses."""
-
-    refused, distance = Number(), Number()
-
-    def __init__(self, distance: float) -> None:
-        """distance [m]: from the estimate, above which a pose is rejected."""
-        self.memory = record("refused", GATE)
-        self.distance = distance
-        forget_rejections(self.memory)
-
-    def __call__(self, stamp: float, distance: float, bias: float) -> bool:
-        """See `rejects`."""
-        return rejects(self.memory, stamp, distance, bias, REJECTED)
-
-    def suspend(self, stamp: float) -> None:
-        """See `suspend`."""
-        suspend(self.memory, stamp)
-
-    def settled(self, stamp: float) -> bool:
-        """See `settled`."""
-        return settled(self.memory, stamp)
+def new_gate() -> np.ndarray:
+    """Return the memory (1,) of the gate of poses, see `rejects`; refused: how many it has."""
+    gate = record("refused", GATE)
+    forget_rejections(gate)
+    return gate
 
 
 @borrowing
 def forget_rejections(gate: np.ndarray) -> None:
-    """Begin anew; gate (1,): memory of a `PoseGate`."""
+    """Begin anew; gate (1,): see `new_gate`. The distance stays."""
     m = gate[0]
     m.refused = 0
     m.suspended = m.last = m.interrupted = -math.inf
@@ -144,7 +115,7 @@ def forget_rejections(gate: np.ndarray) -> None:
 
 @borrowing
 def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float, longest: float) -> bool:
-    """Return whether to reject the pose at `stamp` [s]; gate: see `forget_rejections`.
+    """Return whether to reject the pose at `stamp` [s]; gate: see `new_gate`.
 
     distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
     estimated accelerometer bias; longest [s]: of a rejection.

@@ -13,19 +13,19 @@ import numpy as np
 from uam_control.ages import BRIDGED, FORWARDED, REJECTED, REJECTED_LATE
 from uam_control.coordinates import Z
 from uam_control.estimation.pose_clock import (
-    PoseClock,
-    PoseGate,
-    Repeats,
     counts,
     forget_clock,
     forget_rejections,
+    new_clock,
+    new_gate,
+    no_pose,
     rejects,
     repeated,
     waits,
 )
 from uam_control.estimation.waiting import OLDEST_MATCH, drop_first, insert, value_at
-from uam_control.maths.compiled import jit, prepared
-from uam_control.maths.memory import Number, record
+from uam_control.maths.compiled import jit
+from uam_control.maths.memory import record
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -46,7 +46,9 @@ CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class EstimatedMotion(NamedTuple):
-    """The arrays of a `PoseFilter`; see there."""
+    """position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
+    rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
+    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -88,10 +90,10 @@ def allowed_bandwidth(interval: float) -> float:
 
 
 class FilterArrays(NamedTuple):
-    """State of a `PoseFilter`: memory, see `parts_of`; bandwidths (3,) [rad/s]: of the corrections
+    """State of a filter: memory, see `parts_of`; bandwidths (3,) [rad/s]: of the corrections
     of position and attitude, and the larger of both; used (2,) [rad/s]: in this correction; ahead
     (HISTORY, 8): stamp and pose of those that wait for their IMU sample, in order; newest (7,): see
-    `Repeats`; clock, gate (1,): memories; numbers (1,): see WHOLE, REAL."""
+    `repeated`; clock, gate (1,): of `pose_clock`; numbers (1,): see WHOLE, REAL. all stay."""
 
     memory: np.ndarray
     bandwidths: np.ndarray
@@ -108,66 +110,14 @@ class FilterArrays(NamedTuple):
 WHOLE, REAL = "count waiting", "last_correction compared gravity"
 
 
-class PoseFilter:
-    """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
-
-    position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
-    rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
-    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]. `motion`: all of
-    them; `arrays`: the whole state. The arrays are never replaced.
-    """
-
-    gravity = Number()
-
-    def __init__(
-        self, position_bandwidth: float, attitude_bandwidth: float, gate: float, gravity: float
-    ) -> None:
-        """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`;
-        gravity [m/s^2]."""
-        self.gate, self.memory = PoseGate(gate), record(WHOLE, REAL)
-        self.gravity = gravity
-        self.arrays = FilterArrays(
-            np.zeros(MEMORY),
-            np.zeros(3),
-            np.zeros(2),
-            np.zeros((HISTORY, 1 + POSE)),
-            Repeats().newest,
-            PoseClock().memory,
-            self.gate.memory,
-            self.memory,
-        )
-        self.set_bandwidths(position_bandwidth, attitude_bandwidth)
-        begin_anew(self.arrays)
-        self.motion, _, _ = parts_of(self.arrays.memory)
-        self.position, self.velocity, self.quaternion, self.rates = self.motion[:4]
-        self.acceleration, self.gyro_bias, self.accelerometer_bias = self.motion[4:]
-        still = np.zeros(3)
-        self._predict = prepared(predict_next, self.arrays, 0.0, 0.0, still, still)
-        self._correct = prepared(correct_at, self.arrays, 0.0, still, np.zeros(4))
-
-    @property
-    def ahead(self) -> list[list[float]]:
-        """Return stamp [s] and pose (7) of each that waits for its IMU sample, in order."""
-        return self.arrays.ahead[: self.memory["waiting"].item()].tolist()
-
-    def set_bandwidths(self, position: float, attitude: float) -> None:
-        """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
-        self.arrays.bandwidths[:] = position, attitude, max(position, attitude)
-
-    def start(self, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Begin at rest at a measured pose: position (3,) [m, world], quaternion (4,) [w x y z]."""
-        self.position[:] = position
-        self.quaternion[:] = quaternion
-
-    def predict(
-        self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
-    ) -> None:
-        """See `predict_next`."""
-        self._predict(self.arrays, stamp, dt, gyro, specific_force)
-
-    def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """See `correct_at`."""
-        self._correct(self.arrays, stamp, position, quaternion)
+def filter_arrays() -> FilterArrays:
+    """Return the state of a filter that begins; its parameters are zero."""
+    made = FilterArrays(
+        *(np.zeros(MEMORY), np.zeros(3), np.zeros(2), np.zeros((HISTORY, 1 + POSE))),
+        *(no_pose(), new_clock(), new_gate(), record(WHOLE, REAL)),
+    )
+    begin_anew(made)
+    return made
 
 
 @jit
@@ -226,8 +176,8 @@ def wait(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.nda
     """Let a pose exposed at `stamp` [s] wait for `correct_waiting`.
 
     position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
-    older than the stored predictions, has a wrong clock (`PoseClock`), repeats the last pose
-    exactly (`Repeats`), or has jumped away from the estimate (`PoseGate`). One that is newer
+    older than the stored predictions, has a wrong clock (`counts`), repeats the last pose exactly
+    (`repeated`), or has jumped away from the estimate (`rejects`). One that is newer
     than the newest prediction waits for the IMU. A stored prediction is compared with one pose:
     beside a gap of the IMU the same difference would count several times.
     """
@@ -243,17 +193,10 @@ def wait(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.nda
 
 
 @jit
-def correct_at(a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-    """Correct with a pose, see `wait`, as soon as its IMU sample is there."""
-    wait(a, stamp, position, quaternion)
-    correct_waiting(a)
-
-
-@jit
 def correct_stored(
     a: FilterArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray
 ) -> None:
-    """Correct with a pose that has its prediction, see `correct_at`."""
+    """Correct with a pose that has its prediction, see `wait`."""
     m = a.numbers[0]
     motion, stamps, poses = parts_of(a.memory)
     newest, predicted = (m.count - 1) % HISTORY, a.memory[-POSE:]
@@ -344,7 +287,7 @@ def predict(
 ) -> None:
     """Advance the estimate in place by dt [s]; write position and quaternion into poses[row] (7,).
 
-    gravity [m/s^2]; gyro (3,), specific_force (3,): see `PoseFilter.predict`.
+    gravity [m/s^2]; gyro (3,), specific_force (3,): see `predict_next`.
     """
     position, velocity, quaternion, rates, acceleration, gyro_bias, accelerometer_bias = motion
     pose = poses[row]

@@ -37,7 +37,7 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
-from uam_control.supervision import Authority, Inputs, State
+from uam_control.supervision import Inputs, State
 from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_control.supervision.setpoint_delay import margin_left
 from uam_control.vehicle import VehicleDescription, derived_parameters
@@ -175,14 +175,7 @@ class MissionNode(UamNode):
         return scenario
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
-        stamp, state = AutopilotState.from_message(message)
-        since = state.armed_since if state.armed else None
-        authority = Authority(
-            state.released_to, state.landed, state.lands, state.failed, state.stopped
-        )
-        self.stage.autopilot(
-            stamp, state.connected, since, state.round_trip, state.loop_delay, authority
-        )
+        self.stage.autopilot(*AutopilotState.from_message(message))
 
     def _watch_states(self) -> None:
         """Give up in flight when no state comes: without one, no tick checks any limit."""

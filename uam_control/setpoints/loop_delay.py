@@ -107,7 +107,6 @@ class LoopDelay:
             np.zeros((AXES, 2, DELAYS)),
             np.zeros(AXES + 1),
         )
-        self._follow = prepared(follow, 0.0, np.zeros(3), np.zeros(3), self.sums, self.numbers)
         self._both_axes = prepared(both_axes, self.sums.sums, self.sums.total, self.numbers)
 
     @property
@@ -126,19 +125,10 @@ class LoopDelay:
     def _fit(self) -> tuple[float, float]:
         return self._both_axes(self.sums.sums, self.sums.total, self.numbers)
 
-    def update(self, stamp: float, setpoint: np.ndarray, rates: np.ndarray) -> float:
-        """Take a tick and return `value`; stamp [s], setpoint, rates: see `follow`."""
-        self._follow(stamp, setpoint, rates, self.sums, self.numbers)
-        return self.value
-
-    def pause(self) -> None:
-        """Take no tick: no setpoint from the laws was sent. The value is unknown."""
-        pause(self.sums)
-
 
 @borrowing
 def pause(state: DelaySums) -> None:
-    """Forget the last tick; the delay is unknown."""
+    """Take no tick, as the laws have sent no setpoint: the delay is unknown."""
     state.now[STAMP] = math.nan
 
 

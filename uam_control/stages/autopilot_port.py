@@ -55,40 +55,32 @@ class AutopilotPort(Protocol):
 
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than DISCONNECTED at `time` [s]."""
-        ...
 
     def silent(self, time: float) -> bool:
         """Whether nothing has come from it for `loss_time` at `time` [s], after a first message.
 
         If the link is cut in both directions, its failsafe has begun.
         """
-        ...
 
     @property
     def loss_time(self) -> float:
         """For how long [s] the autopilot stays in OFFBOARD without setpoints: COM_OF_LOSS_T."""
-        ...
 
     @property
     def round_trip(self) -> float | None:
         """Shortest round trip [s] of the latest messages; None if unknown."""
-        ...
 
     def poll(self, time: float) -> None:
         """Receive the messages that have arrived by the tick `time` [s]."""
-        ...
 
     def tick(self, time: float) -> None:
         """Send the heartbeat and the sequence's requests that are due at `time` [s]."""
-        ...
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
-        ...
 
     def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
-        ...
 
 
 class AutopilotReport(NamedTuple):
@@ -121,28 +113,29 @@ class AutopilotReport(NamedTuple):
 
 
 class AutopilotReports:
-    """Makes the reports when they are due. `last`: the newest one."""
+    """Makes the reports when they are due. `last`: the newest one; `next` [ns]: when the next one
+    is due, even if nothing changes."""
 
-    _due = Number()
+    next = Number()
 
     def __init__(
         self, autopilot: AutopilotPort, sequence: OffboardSequence, loop_delay: LoopDelay
     ) -> None:
         self._autopilot, self._sequence = autopilot, sequence
         self._loop_delay = loop_delay
-        self.memory = record("due")  # [ns]
-        self._due = -1
+        self.memory = record("next")
+        self.next = -1
         self._reported: tuple | None = None  # what a change of brings a report
         self.last: AutopilotReport | None = None
 
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
         what = self._what(stamp)
-        if stamp < self._due and what == self._reported:
+        if stamp < self.next and what == self._reported:
             return None
         autopilot = self._autopilot
         since, delay = autopilot.armed_since, self._loop_delay.value
-        self._due, self._reported = stamp + REPORT_PERIOD, what
+        self.next, self._reported = stamp + REPORT_PERIOD, what
         self.last = AutopilotReport(
             *what,
             None if since is None else nanoseconds(since),
@@ -150,11 +143,6 @@ class AutopilotReports:
             None if math.isnan(delay) else delay,
         )
         return self.last
-
-    @property
-    def next(self) -> int:
-        """The stamp [ns] from which on the next report is due, even if nothing changes."""
-        return self._due
 
     def settled(self, stamp: int) -> bool:
         """Return whether the autopilot is connected at the tick `stamp` [ns], and all is reported

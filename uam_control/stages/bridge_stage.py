@@ -21,7 +21,7 @@ from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence, Phase
 from uam_control.setpoints.level_hold import HoldParameters, follow_thrust
-from uam_control.setpoints.loop_delay import DelayNumbers
+from uam_control.setpoints.loop_delay import DelayNumbers, pause
 from uam_control.setpoints.rate_thrust_map import (
     RateThrustMap,
     RateThrustParameters,
@@ -108,7 +108,7 @@ class BridgeStage:
     `sent` (4,): body rates [rad/s, FLU] and thrust of the last setpoint, see `sent`;
     `factor`: thrust factor used for it; `lift_due`: whether factor and `lift` are reported;
     `report`: the report of the autopilot due after the last tick, None if none is due;
-    `last` [ns]: stamp of the last tick.
+    `last` [ns]: stamp of the last tick; `kept`: its setpoint; `lift`: see `FlightMeasurements`.
     """
 
     factor, lift_due, last, _compiled = Number(), Flag(), Number(), Flag()
@@ -130,10 +130,10 @@ class BridgeStage:
         self.map = RateThrustMap(sets.mapping, vehicle)
         self.measurements = FlightMeasurements(sets.identification, vehicle)
         self.identification = self.measurements.identification
-        self.loop_delay = self.measurements.loop_delay
+        self.loop_delay, self.lift = self.measurements.loop_delay, self.measurements.lift
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self.vision = VisionPacing(sets.vision)
-        self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
+        self._hold, self.kept = SampleHold(sets.setpoint.setpoint_rate), None
         self.reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
@@ -261,7 +261,7 @@ class BridgeStage:
             return None
         self._compiled = False
         self.note_state(stamp, state)
-        self._kept = AttitudeTarget.of_rates(swap_body(self.sent[:3]), self.sent.item(3))
+        self.kept = AttitudeTarget.of_rates(swap_body(self.sent[:3]), self.sent.item(3))
         self.report = self.reports.due(self.last)
         return self.report
 
@@ -281,29 +281,19 @@ class BridgeStage:
         self.sent[:3], self.sent[3] = rates, thrust
         return rates, thrust
 
-    @property
-    def kept(self) -> Setpoint:
-        """The setpoint of the last tick."""
-        return self._kept
-
-    @property
-    def lift(self) -> np.ndarray:
-        """See `FlightMeasurements`."""
-        return self.measurements.lift
-
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
         """Return the setpoint of the last period at `now` [s] if this one is not due."""
         if not flying or setpoint is None:
-            self._kept = None
+            self.kept = None
             return setpoint
-        if self._hold.due(now) or self._kept is None:
-            self._kept = setpoint
-        return self._kept
+        if self._hold.due(now) or self.kept is None:
+            self.kept = setpoint
+        return self.kept
 
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""
-        now, self._kept = stamp / SECOND, None
-        self.loop_delay.pause()
+        now, self.kept = stamp / SECOND, None
+        pause(self.loop_delay.sums)
         setpoint = self.source.without(now, self._situation)
         self._note_sent(setpoint)
         self._send(now, setpoint)
@@ -367,4 +357,4 @@ def sending(port: PortSteps) -> Callable[[tuple], int]:
 def unreported(a: tuple) -> int:
     """Return DONE until the last tick has a report; a: `BridgeArrays` alone."""
     (bridge,) = a
-    return DONE if bridge.bridge[0].last < bridge.reports[0].due else ASK
+    return DONE if bridge.bridge[0].last < bridge.reports[0].next else ASK

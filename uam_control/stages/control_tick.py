@@ -55,7 +55,7 @@ from uam_control.stages.supervisor_inputs import BIAS, GAINS, LIFT, keep, read_i
 from uam_control.stages.timing import Timing
 from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
-from uam_control.supervision import Authority, State
+from uam_control.supervision import State
 from uam_control.vehicle import VehicleDescription
 
 
@@ -299,16 +299,7 @@ def send_setpoint(tick: ControlTick) -> bool:
 def take_report(tick: ControlTick, report: AutopilotReport) -> None:
     """Give the bridge's report of the present tick to mission and attitude law."""
     stamp = tick.signals.stamp
-    held = report.released_to, report.landed, report.lands, report.failed, report.stopped
-    authority = Authority(*held)
-    tick.mission.autopilot(
-        stamp,
-        report.connected,
-        report.armed_since,
-        report.round_trip,
-        report.loop_delay,
-        authority,
-    )
+    tick.mission.autopilot(stamp, report)
     tick.measured_delay.report(stamp, report.loop_delay)
 
 

@@ -53,10 +53,6 @@ class PoseAge:
         """Take the stamp [ns] of a pose that has arrived."""
         self.memory["arrived"] = exposed
 
-    def tick(self, stamp: int) -> None:
-        """See `age_at`."""
-        age_at(self.memory, stamp)
-
     def restart(self) -> None:
         """Begin a new period of `largest`."""
         self.largest = 0
@@ -164,16 +160,13 @@ class PlainEstimatorStage(EstimatorStage):
         self._judge = bound(judge, self.arrays, self.state)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """See `take_pose`."""
         self.pose_age.pose(stamp)
         self.estimator.mocap(stamp / SECOND, position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """See `take_readings`."""
         self.estimator.joints(stamp / SECOND, alpha, alpha_dot)
 
     def _sample(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> int:
-        """See `take_sample`."""
         estimator, begun = self.estimator, self._begin(stamp)
         if begun != STATE:
             return begun

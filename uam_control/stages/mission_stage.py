@@ -11,6 +11,7 @@ from uam_control.maths.memory import Number, record
 from uam_control.mission import Mission
 from uam_control.mission.following import MOST
 from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
+from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.tick_stamps import carried, serves
@@ -52,29 +53,17 @@ class MissionStage:
         self.reference, self.time = self.output.reference, self.output.time
         self.ahead = self._last = -1
         self._armed_since: float | None = None
-        self._reports: deque[tuple[int, bool, int | None, tuple[float, ...], Authority]] = deque()
+        self._reports: deque[tuple[int, AutopilotReport]] = deque()  # and stamps [ns]
         self._authority = Authority()
         self._readings = Readings()
         self._flown = -REPORT_DELAY
 
-    def autopilot(
-        self,
-        stamp: int,
-        connected: bool,
-        armed_since: int | None,
-        round_trip: float | None,
-        loop_delay: float | None,
-        authority: Authority,
-    ) -> None:
+    def autopilot(self, stamp: int, report: AutopilotReport) -> None:
         """Take the bridge's report of the tick `stamp` [ns]; it is used from the next tick on.
 
-        armed_since [ns]: the first tick at which the autopilot was reported armed, None while it is
-        not armed; round_trip [s]: response time of the autopilot, loop_delay [s]: from a setpoint
-        to the gyro's response, each None if not measured;
-        authority: who has control.
+        A message's `AutopilotState` has the same entries.
         """
-        delays = tuple(math.nan if one is None else one for one in (round_trip, loop_delay))
-        self._reports.append((stamp, connected, armed_since, delays, authority))
+        self._reports.append((stamp, report))
 
     def begin(self, stamp: int, state: np.ndarray) -> None:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
@@ -98,10 +87,14 @@ class MissionStage:
     def take_reports(self, stamp: int) -> None:
         """Use the bridge's reports of the ticks before `stamp` [ns]."""
         while self._reports and self._reports[0][0] < stamp:
-            reported, connected, since, delays, self._authority = self._reports.popleft()
-            self._armed_since = None if since is None else since / SECOND
-            if connected:
-                self.inputs.inputs.autopilot(reported / SECOND, *delays)
+            reported, r = self._reports.popleft()
+            self._authority = Authority(r.released_to, r.landed, r.lands, r.failed, r.stopped)
+            armed = r.armed and r.armed_since is not None
+            self._armed_since = r.armed_since / SECOND if armed else None
+            if r.connected:
+                delays = (r.round_trip, r.loop_delay)
+                known = (math.nan if one is None else one for one in delays)
+                self.inputs.inputs.autopilot(reported / SECOND, *known)
 
     def _begin_anew(self) -> None:
         """Forget the flight: stamps went back, the simulation is a new one."""

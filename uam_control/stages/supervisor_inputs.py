@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import BRIDGED
-from uam_control.estimation.pose_clock import PoseClock, counts
+from uam_control.estimation.pose_clock import counts, new_clock
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Number, put, record
@@ -53,7 +53,7 @@ class StageArrays(NamedTuple):
 
 class SupervisorInputs:
     """Keeps messages until the next reading; `readings`: of the last tick, see `Readings`;
-    `clock`: of the poses; `arrays`: what compiled functions use, None before `share`."""
+    `clock` (1,): of the poses; `arrays`: what compiled functions use, None before `share`."""
 
     _read_at = Number()
 
@@ -61,7 +61,7 @@ class SupervisorInputs:
         """control_period [s]: time between two ticks."""
         self.inputs = Inputs(control_period)
         self.readings = Readings()
-        self.clock = PoseClock()
+        self.clock = new_clock()
         self._kept: dict[str, list[Kept]] = {}
         self._joints, self._names = 0, []
         self.arrays: StageArrays | None = None
@@ -91,7 +91,7 @@ class SupervisorInputs:
         watched = tuple(map(self.inputs.watched, self._names))
         self.arrays = StageArrays(
             *(*kept, np.zeros((KINDS, width)), watched),
-            *(self.inputs.arrays, self.clock.memory, self.memory),
+            *(self.inputs.arrays, self.clock, self.memory),
         )
         self._read = bound(read_messages, self.arrays, 0)
 
@@ -115,7 +115,7 @@ class SupervisorInputs:
         """Forget all values: stamps of a new simulation follow."""
         self.inputs.begin_anew()
         self.readings = Readings()
-        self.clock = PoseClock()
+        self.clock = new_clock()
         self._kept.clear()
         if self.arrays is not None:
             self._arrange()
@@ -123,25 +123,15 @@ class SupervisorInputs:
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z].
 
-        One that does not count for its `PoseClock` is none: from the future, its age would never
+        One that does not count is none: from the future, its age would never
         reach a limit; too late, or of a wrong clock, the estimate does not use it.
         """
-        if self.clock(stamp / SECOND, self._read_at / SECOND, BRIDGED):
+        if counts(self.clock, stamp / SECOND, self._read_at / SECOND, BRIDGED):
             self.inputs.mocap(stamp / SECOND, position, quaternion)
 
     def payload(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of the payload's grip point, as `mocap` does."""
         self.inputs.payload(stamp / SECOND, position)
-
-    def joints(
-        self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray, effort: np.ndarray
-    ) -> None:
-        """Read the joints at `stamp` [ns]; of alpha, alpha_dot, effort (n,) only effort [N m]."""
-        self.inputs.joints(stamp / SECOND, effort)
-
-    def grip(self, stamp: int, grip: np.ndarray) -> None:
-        """Read opening [m] and closing force [N] of fingers (2,) at `stamp` [ns]."""
-        self.inputs.grip(grip)
 
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""

@@ -17,7 +17,7 @@ too, carried on by its own rates; the error is of third order in the difference.
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Number, record
 from uam_control.stamps import SECOND
 
@@ -44,16 +44,6 @@ class TickStamps:
         """period [ns]: control period, the nominal period of the IMU."""
         self.memory, self.window = record(WHOLE, REAL), np.zeros(WINDOW + 1, dtype=np.int64)
         self.memory[0] = period, -1, -1, 0, 0, 0, 0.0
-        self._follows = prepared(follows, self.memory, 0)
-        self._next = prepared(next_stamp, self.memory, self.window, 0)
-
-    def follows(self, sample: int) -> bool:
-        """See `follows`."""
-        return self._follows(self.memory, sample)
-
-    def next(self, sample: int) -> int:
-        """See `next_stamp`."""
-        return self._next(self.memory, self.window, sample)
 
 
 @borrowing

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.ages import FORWARDED
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT
-from uam_control.estimation.pose_clock import PoseClock, Repeats, counts, repeated
+from uam_control.estimation.pose_clock import counts, new_clock, no_pose, repeated
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import put, record
 from uam_control.setpoints.targets import VisionPose
@@ -35,7 +35,7 @@ class VisionParameters(ParameterSet):
 
 class VisionArrays(NamedTuple):
     """State of a `VisionPacing`. pose (7,): newest position and quaternion; last (7,), clock (1,):
-    of `Repeats` and `PoseClock`; numbers (1,): whether the pose waits; [s] of its exposure and that
+    see `repeated` and `counts`; numbers (1,): whether the pose waits; [s] of its exposure and that
     of the last pose sent, interval."""
 
     pose: np.ndarray
@@ -53,7 +53,7 @@ class VisionPacing:
     def __init__(self, parameters: VisionParameters) -> None:
         p, numbers = parameters, record("waits", "exposed sent interval")
         numbers[0] = False, 0.0, -1.0, p.vision_interval
-        self.arrays = VisionArrays(np.zeros(7), Repeats().newest, PoseClock().memory, numbers)
+        self.arrays = VisionArrays(np.zeros(7), no_pose(), new_clock(), numbers)
         self._deviations = p.vision_position_deviation, p.vision_attitude_deviation
         self._unknown = np.full((3, ALPHA), math.nan)
         still = np.zeros(3)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import STALE
-from uam_control.estimation.pose_clock import Repeats, repeated
+from uam_control.estimation.pose_clock import no_pose, repeated
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Known, Number, put, record
 from uam_control.supervision.observation import ReadingArrays, Readings
@@ -31,7 +31,7 @@ REAL = (
 
 class InputArrays(NamedTuple):
     """State of `Inputs`. readings (1,), known, payload (3,), grip (2,): of `Readings`; bias_mean
-    (3,) [m/s^2]; newest (7,): of `Repeats`; numbers (1,): see REAL."""
+    (3,) [m/s^2]; newest (7,): see `repeated`; numbers (1,): see REAL."""
 
     readings: np.ndarray
     known: ReadingArrays
@@ -66,7 +66,7 @@ class Inputs:
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], np.ndarray] = {}
         self._pace = Pace()
-        self._make_arrays(np.zeros(3), Repeats().newest)
+        self._make_arrays(np.zeros(3), no_pose())
 
     def _make_arrays(self, bias_mean: np.ndarray, newest: np.ndarray) -> None:
         r = self._readings

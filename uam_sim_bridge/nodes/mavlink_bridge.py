@@ -24,6 +24,7 @@ from uam_control.nodes.pose_source import PoseSource
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.offboard.sequence import OffboardSequence
 from uam_control.setpoints.level_hold import HoldParameters
+from uam_control.setpoints.loop_delay import pause
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import Setpoint, sent
 from uam_control.setpoints.setpoint_types import SETPOINTS, SetpointParameters
@@ -363,7 +364,7 @@ class MavlinkBridgeNode(UamNode):
             ThrustIdentificationParameters.of(self._vehicle), self._vehicle
         )
         measured.update(0.0, 0.004, state, Sent(zero, 0.5, True, False, 1.0), spare.curve)
-        measured.loop_delay.pause()
+        pause(measured.loop_delay.sums)
         vision_message(VisionPose(0.0, zero, level, 1.0, 1.0))
 
 
