@@ -101,7 +101,7 @@ def test_asmc2_by_hand():
     law = asmc2()
     assert update(law, 0.25, 0.3, 1.0, rate=2.0) == pytest.approx(-6.45707, abs=1e-5)
     assert law.adaptation[3] == pytest.approx(5.062966, abs=1e-6)
-    assert law.adaptation[4] == 0.5 and law.clamps == 0
+    assert law.adaptation[4] == 0.5 and law.adaptation[5] == 0
     # gamma sigma = 1: theta_i = theta_i e^-dt + (1 - e^-dt) ||w|| 2^i / 0.5
     keep = math.exp(-DT)
     for i, start in enumerate([0.5, 0.25, 0.125]):
@@ -135,13 +135,13 @@ def test_asmc2_makes_s_decay_with_k_s_while_the_funnel_narrows(e, e_dot):
 def test_asmc2_clamps_eta_and_counts():
     law = asmc2(adapt=False)
     far, farther = update(law, 3.0, 0.1), update(law, -200.0, 0.1)
-    assert law.clamps == 2
+    assert law.adaptation[5] == 2
     assert law.adaptation[4] == 400.0  # |eta| before the clamp
     inside = update(law, 0.49, 0.1)  # eta = 0.98 is the last that is not clamped
-    assert law.clamps == 2
+    assert law.adaptation[5] == 2
     assert far == pytest.approx(inside) and farther > 0.0 > far
     law.reset()
-    assert law.clamps == 0
+    assert law.adaptation[5] == 0
 
 
 def test_asmc2_counts_time_from_its_reset():

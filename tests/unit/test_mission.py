@@ -167,7 +167,9 @@ def test_no_take_off_beyond_a_limit():
     flight.state[0, 3] = 1.2  # lying on its side
     for _ in range(300):
         output = flight.step()
-    assert output.state is State.GROUNDED and "tilt" in flight.mission.beyond and not output.arm
+    assert (
+        output.state is State.GROUNDED and "tilt" in flight.mission.checks.beyond and not output.arm
+    )
     flight.state[0, 3] = 0.0
     assert flight.until(lambda o: o.arm).state is State.GROUNDED
     flight.armed_at, flight.state[0, 3] = flight.stamp, 1.2

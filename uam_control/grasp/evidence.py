@@ -7,7 +7,7 @@ fused by their variances.
 """
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -121,39 +121,29 @@ def touches_beside(sight: Sight, distance: float) -> bool:
     return bool(away[2] < REACH and np.hypot(*away[:2]) >= distance)
 
 
-class GripperKind(Protocol):
-    """One kind. `early`: it may act before the contact."""
+class GripperKind:
+    """One kind: without a measurement of its own, as an electromagnet or a suction cup.
 
-    early: bool
-
-    def held(self, sight: Sight, p: GraspParameters) -> Evidence:
-        """Return whether it holds something, as far as it feels it; "" without a measurement."""
-
-    def let_go(self, sight: Sight, p: GraspParameters) -> bool:
-        """Return whether it has let go what it held, as far as it feels it."""
-
-
-class Insensible:
-    """A gripper without a measurement of its own: an electromagnet, a suction cup."""
+    `early`: it may act before the contact.
+    """
 
     early = True
 
     def held(self, sight: Sight, p: GraspParameters) -> Evidence:
-        """See `GripperKind`."""
+        """Return whether it holds something, as far as it feels it; "" without a measurement."""
         return Evidence(None, "")
 
     def let_go(self, sight: Sight, p: GraspParameters) -> bool:
-        """See `GripperKind`."""
+        """Return whether it has let go what it held, as far as it feels it."""
         return False
 
 
-class Fingers:
+class Fingers(GripperKind):
     """Two fingers that report opening and force: closed without resistance, they hold nothing."""
 
     early = False
 
     def held(self, sight: Sight, p: GraspParameters) -> Evidence:
-        """See `GripperKind`."""
         if math.isnan(sight.opening):
             return Evidence(None, "fingers not measured")
         text = f"fingers {1e3 * sight.opening:.0f} mm open, {sight.squeeze:.1f} N"
@@ -162,7 +152,6 @@ class Fingers:
         return Evidence(True if sight.squeeze >= PRESSED * p.gripper_force else None, text)
 
     def let_go(self, sight: Sight, p: GraspParameters) -> bool:
-        """See `GripperKind`."""
         return self._part(sight, p) >= 1.0 - SLACK
 
     @staticmethod
@@ -172,8 +161,4 @@ class Fingers:
         return (sight.opening - closed) / (opened - closed)
 
 
-GRIPPERS: dict[str, GripperKind] = {
-    NO_GRIPPER: Insensible(),
-    MAGNET: Insensible(),
-    TWO_FINGER: Fingers(),
-}
+GRIPPERS = {NO_GRIPPER: GripperKind(), MAGNET: GripperKind(), TWO_FINGER: Fingers()}

@@ -106,9 +106,8 @@ class Asmc1Law(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        disturbance = tuple(f"D{i}" for i in range(1, axes + 1))
         return (
-            GainGroup("$\\hat D$", disturbance, "D", signed=True),
+            GainGroup.of_axes("$\\hat D$", "D", "D", axes),
             GainGroup("‖s‖", ("s_norm",)),
         )
 

@@ -152,11 +152,6 @@ class Asmc2Law(Law):
             GainGroup("", ("clamps",)),
         )
 
-    @property
-    def clamps(self) -> int:
-        """Number of clamped values of |eta| since the reset, summed over the axes."""
-        return int(self.adaptation[CLAMPS])
-
     def reset_adaptation(self) -> None:
         """Set theta to its initial value; the time since the start of the law continues."""
         self.adaptation[:3] = self.parameters.theta_initial

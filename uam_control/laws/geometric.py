@@ -126,23 +126,12 @@ class GeometricL1Law(Law):
 
     kind = GeometricL1Parameters
     label = "geometric L1"
+    memory, per_axis = 1, 1  # whether the predictor has begun; e_dot_hat
     step = geometric_l1_step
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        axis = range(1, axes + 1)
         return (
-            GainGroup("$\\hat\\sigma$", tuple(f"sigma{i}" for i in axis), "\\hat\\sigma", True),
-            GainGroup(
-                "$C\\hat\\sigma$", tuple(f"filtered{i}" for i in axis), "C\\hat\\sigma", True
-            ),
+            GainGroup.of_axes("$\\hat\\sigma$", "sigma", "\\hat\\sigma", axes),
+            GainGroup.of_axes("$C\\hat\\sigma$", "filtered", "C\\hat\\sigma", axes),
         )
-
-    @property
-    def memory(self) -> int:
-        """e_dot_hat per axis, and whether the predictor has begun."""
-        return len(self.parameters.inertia) + 1
-
-    def reset_adaptation(self) -> None:
-        """Set sigma_hat and its low-pass to zero, and begin the predictor anew."""
-        self.adaptation[:] = 0.0

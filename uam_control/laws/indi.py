@@ -62,18 +62,9 @@ class IndiLaw(Law):
 
     kind = IndiParameters
     label = "INDI"
+    memory, per_axis = 1, 3  # whether the filters have begun; tau, e_dot_f, chi_d_ddot_f
     step = indi_step
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        names = tuple(f"tau_f{i}" for i in range(1, axes + 1))
-        return (GainGroup("$\\tau_f$", names, "\\tau", True),)
-
-    @property
-    def memory(self) -> int:
-        """tau, e_dot_f and chi_d_ddot_f per axis, and whether the filters have begun."""
-        return 3 * len(self.parameters.inertia) + 1
-
-    def reset_adaptation(self) -> None:
-        """Set the torque of before to zero, and begin the filters anew."""
-        self.adaptation[:] = 0.0
+        return (GainGroup.of_axes("$\\tau_f$", "tau_f", "\\tau", axes),)

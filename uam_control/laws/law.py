@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -23,6 +23,11 @@ class GainGroup:
     names: tuple[str, ...]
     symbol: str = ""
     signed: bool = False
+
+    @classmethod
+    def of_axes(cls, label: str, name: str, symbol: str, axes: int) -> Self:
+        """Return one signed gain per axis: name1, name2, ..."""
+        return cls(label, tuple(f"{name}{i}" for i in range(1, axes + 1)), symbol, signed=True)
 
 
 class LawInputs(NamedTuple):
@@ -55,12 +60,12 @@ class Law:
     | `kind` | class of its parameters; the default of their `law` is the name of the law |
     | `label` | its name in tables and figures |
     | `profile` | its profile in config/profiles; "": see `default_profile` |
-    | `memory` | number of values in `adaptation` after the published gains |
+    | `memory`, `per_axis` | values in `adaptation` after the published gains: in all, per axis |
     | `step` | the compiled function of one tick: step(record, inputs, adaptation, tau) |
     | `whole` | whether in flight `control.whole_body` computes all three subsystems at once |
 
-    `names`: of the published gains, which are the first values of `adaptation`, a float64 array
-    (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`). `arrays`:
+    `names`: of the published gains, the first values of `adaptation`, a float64 array (len(names) +
+    memory + per_axis n,). `frozen`: the adapted gains do not change (parameter `adapt`). `arrays`:
     made anew with the parameters.
     """
 
@@ -68,6 +73,7 @@ class Law:
     label: str
     profile: str = ""
     memory: int = 0
+    per_axis: int = 0
     whole: bool = False
     step: Callable
 
@@ -75,7 +81,7 @@ class Law:
         axes, self.parameters = len(parameters.inertia), parameters
         self.names = self.gain_names(axes)
         self._tau, self._no_bias = np.zeros(axes), np.zeros(axes)
-        self.adaptation = np.zeros(len(self.names) + self.memory)
+        self.adaptation = np.zeros(len(self.names) + self.memory + self.per_axis * axes)
         self.set_parameters(parameters)
         self.reset()
 
@@ -114,8 +120,11 @@ class Law:
         self.reset_adaptation()
 
     def reset_adaptation(self) -> None:
-        """Set the adapted gains to their initial values; filters and time continue."""
-        raise NotImplementedError
+        """Set the adapted gains to their initial values; filters and time continue.
+
+        By default all begins anew, at zero.
+        """
+        self.adaptation[:] = 0.0
 
     def update(
         self,

@@ -274,12 +274,7 @@ class ModularLaw(Law):
             GainGroup("ζ", ("zeta",)),
             GainGroup("ρ", ("rho",)),
             GainGroup("", ("r_norm",)),
-            GainGroup(
-                "$\\hat\\theta$",
-                tuple(f"bias{i}" for i in range(1, axes + 1)),
-                "\\hat\\theta",
-                True,
-            ),
+            GainGroup.of_axes("$\\hat\\theta$", "bias", "\\hat\\theta", axes),
         )
 
     @property

@@ -76,22 +76,13 @@ class WholeBodyL1Law(Law):
 
     kind = WholeBodyL1Parameters
     label = "whole-body L1"
+    memory, per_axis = 1, 1  # whether the predictor has begun; predicted rates
     step = whole_body_alone
     whole = True
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        axis = range(1, axes + 1)
         return (
-            GainGroup("$\\hat d$", tuple(f"d{i}" for i in axis), "\\hat d", True),
-            GainGroup("$\\hat d_{int}$", tuple(f"internal{i}" for i in axis), "\\hat d", True),
+            GainGroup.of_axes("$\\hat d$", "d", "\\hat d", axes),
+            GainGroup.of_axes("$\\hat d_{int}$", "internal", "\\hat d", axes),
         )
-
-    @property
-    def memory(self) -> int:
-        """Predicted rate per axis, and whether the predictor has begun."""
-        return len(self.parameters.inertia) + 1
-
-    def reset_adaptation(self) -> None:
-        """Set d and d_int to zero, and begin the predictor anew."""
-        self.adaptation[:] = 0.0

@@ -44,6 +44,7 @@ from uam_control.supervision import (
     StateTransition,
     Supervisor,
 )
+from uam_control.supervision.checks import Checks
 from uam_control.vehicle import VehicleDescription
 
 NOBODY = Authority()  # has taken control from the companion
@@ -112,7 +113,7 @@ class FlightSequence:
     def _check_reference(self) -> None:
         """Compare the reference with the limits, and hold beyond the delay that it stands."""
         self._pre_arm.check_reference(self._parameters)
-        self._supervisor.checks.follow(self._pre_arm.stands)
+        self.checks.follow(self._pre_arm.stands)
 
     def _use(self, scenario: Scenario) -> None:
         """Fly `scenario`."""
@@ -134,8 +135,7 @@ class FlightSequence:
         """Return the pre-arm report of the newest step; () before the first one."""
         if self._seen is None:
             return ()
-        checks = self._supervisor.checks
-        return self._pre_arm.report(self._stamp, checks, self._seen, self._parameters)
+        return self._pre_arm.report(self._stamp, self.checks, self._seen, self._parameters)
 
     @property
     def not_ready(self) -> str:
@@ -173,14 +173,9 @@ class FlightSequence:
         return max(0.0, output.time - guidance.scenario_time)
 
     @property
-    def setpoint_delay(self) -> float:
-        """Return how much later than in the profile's model the setpoints act [s], or NaN."""
-        return self._supervisor.setpoint_delay
-
-    @property
-    def beyond(self) -> str:
-        """Return the cause of the worst exceeded limit, "" without one."""
-        return self._supervisor.beyond
+    def checks(self) -> Checks:
+        """The supervisor's checks after the newest step."""
+        return self._supervisor.checks
 
     def step(
         self,

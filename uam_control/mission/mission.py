@@ -159,7 +159,7 @@ class Mission(FlightSequence):
         m["height"], m["speed"] = p.touchdown_height, p.touchdown_speed
         m["half"] = self.scenario.landing.half
         self.arrays = MissionArrays(
-            *(self._guidance.arrays, supervisor.checks.arrays),
+            *(self._guidance.arrays, self.checks.arrays),
             *(supervisor.memory, self._watch.memory, m),
         )
 

@@ -277,7 +277,7 @@ class MissionNode(UamNode):
     def status(self) -> MissionStatus:
         """Phase, errors and state of the mission at the newest tick."""
         output, errors = self._mission.output, self.errors.newest()
-        late = self._mission.setpoint_delay
+        late = self._mission.checks.setpoint_delay
         return MissionStatus(
             output.phase,
             self.stage.time,
@@ -327,7 +327,7 @@ class MissionNode(UamNode):
 
     def _log_held_back(self) -> None:
         """Log once which limit prevents the take-off, and that it does no longer."""
-        beyond = self._mission.beyond if self._mission.output.state is State.GROUNDED else ""
+        beyond = self._mission.checks.beyond if self._mission.output.state is State.GROUNDED else ""
         if bool(beyond) is not self._held_back:
             self._held_back = bool(beyond)
             text = f"no take-off: {beyond}" if beyond else "no limit is exceeded any more"
@@ -342,9 +342,9 @@ class MissionNode(UamNode):
             self.get_logger().info(text)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        output, beyond = self._mission.output, self._mission.beyond
+        output, beyond = self._mission.output, self._mission.checks.beyond
         odd = output.state in (State.HOLDING, State.RELEASED)
-        limits, delay = self.parameter_set.current, self._mission.setpoint_delay
+        limits, delay = self.parameter_set.current, self._mission.checks.setpoint_delay
         slower, late = self.stage.inputs.readings.slower, ""
         if delay > limits.delay_warn * limits.delay_margin:
             share = 100.0 * margin_left(delay, limits)

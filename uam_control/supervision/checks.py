@@ -199,6 +199,11 @@ class Checks:
         self.memory["delay_nominal"] = p.delay_nominal
         self.memory["share"] = p.delay_share_of_round_trip
 
+    @property
+    def beyond(self) -> str:
+        """The cause of the worst exceeded limit, "" without one."""
+        return self.finding.cause if self.finding else ""
+
     def follow(self, stands: float) -> None:
         """Use a reference that stands a delay of the setpoints of `stands` [s], inf: any."""
         self._stands = stands

@@ -189,8 +189,13 @@ def take_bias(a: InputArrays, stamp: float, bias: np.ndarray) -> None:
     if math.isnan(m.bias_first):
         m.bias_first = m.bias_last = stamp
         put(bias, a.bias_mean)
-    away = follow_bias(stamp, m.bias_first, m.bias_last, bias, a.bias_mean)
-    m.bias_last, a.readings[0].contradiction = stamp, away
+    step, memory = max(stamp - m.bias_last, 0.0), min(max(stamp - m.bias_first, 1e-3), BIAS_MEMORY)
+    gain, squared = min(step / memory, 1.0), 0.0
+    for i in range(3):
+        away = bias[i] - a.bias_mean[i]
+        squared += away * away
+        a.bias_mean[i] += gain * away
+    m.bias_last, a.readings[0].contradiction = stamp, math.sqrt(squared)
 
 
 @borrowing
@@ -225,24 +230,6 @@ def take_ages(a: InputArrays, stamp: float) -> None:
     r.payload_age = stamp - m.payload
     r.controller_age = stamp - m.oldest
     r.pose_controller_age = stamp - m.oldest_of_pose
-
-
-@borrowing
-def follow_bias(
-    stamp: float, first: float, last: float, bias: np.ndarray, mean: np.ndarray
-) -> float:
-    """Return the distance [m/s^2] of a bias (3,) from the mean (3,), which then follows it.
-
-    stamp, first, last [s]: of this bias, of the first and of the one before.
-    """
-    step, memory = max(stamp - last, 0.0), min(max(stamp - first, 1e-3), BIAS_MEMORY)
-    gain = min(step / memory, 1.0)
-    squared = 0.0
-    for i in range(3):
-        away = bias[i] - mean[i]
-        squared += away * away
-        mean[i] += gain * away
-    return math.sqrt(squared)
 
 
 @borrowing

@@ -41,7 +41,7 @@ NOT_FOLLOWED = "no lift-off: the autopilot is silent, or lands by itself"
 class Supervisor:
     """The state machine of `states.TRANSITIONS`; its only time is the stamps of the inputs.
 
-    `state`, `cause`, `decision`: after the last step; `changes`: all transitions so far, in order.
+    `state`, `cause`, `decision`, `checks`: after the last step; `changes`: all transitions so far.
     """
 
     _stamp = Number()
@@ -65,13 +65,13 @@ class Supervisor:
         self._interrupted = State.FLYING  # what it did before it became blind
         self._stamp = -math.inf
         self._holds = Holds()
-        self._checks = Checks(parameters)
+        self.checks = Checks(parameters)
         self._stays_behind = prepared(stays_behind, self.memory, 0.0, 0.0)
         self._use(parameters)
 
     def configure(self, parameters: SupervisionParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
-        self._checks.configure(parameters)
+        self.checks.configure(parameters)
         self._use(parameters)
 
     def _use(self, parameters: SupervisionParameters) -> None:
@@ -89,7 +89,7 @@ class Supervisor:
         """
         if stamp > self._stamp and math.isfinite(stamp):
             self._stamp = stamp
-        finding = self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
+        finding = self.checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
         if finding is None and command is None and self._as_usual(seen):
             return self.decision
         self._held_by(seen.authority)
@@ -109,12 +109,7 @@ class Supervisor:
     @property
     def calm(self) -> bool:
         """Whether no value is beyond a limit, not even for a short time, and no hold lasts."""
-        return self._checks.quiet and self._checks.finding is None and not self._holds.lasts
-
-    @property
-    def checks(self) -> Checks:
-        """The checks after the last step."""
-        return self._checks
+        return self.checks.quiet and self.checks.finding is None and not self._holds.lasts
 
     def start(self) -> None:
         """Desire an armed autopilot from the next step on; no effect after the first call."""
@@ -155,21 +150,10 @@ class Supervisor:
             if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
                 return f"{self.state.value} and not on the ground: land first"
             return f"not while {self.state.value}"
-        finding = self._checks.finding
+        finding = self.checks.finding
         if command in (OperatorCommand.RESUME, OperatorCommand.GOAL) and finding is not None:
             return finding.cause
         return ""
-
-    @property
-    def setpoint_delay(self) -> float:
-        """Return the delay of the setpoints [s] at the last tick, NaN if unknown."""
-        return self._checks.setpoint_delay
-
-    @property
-    def beyond(self) -> str:
-        """Return the cause of the worst exceeded limit, "" without one."""
-        finding = self._checks.finding
-        return finding.cause if finding else ""
 
     def _decide(self) -> Decision:
         """Return the decision for the state, by the policy of docs/supervision.md."""
@@ -197,7 +181,7 @@ class Supervisor:
         self, seen: Observation, command: OperatorCommand | None
     ) -> Iterator[tuple[Event, str]]:
         """Yield the events of this tick and their causes, the most urgent first."""
-        finding, p = self._checks.finding, self._parameters
+        finding, p = self.checks.finding, self._parameters
         level, cause = (finding.level, finding.cause) if finding else (Level.FINE, "")
         if seen.authority.stopped:
             yield Event.STOPPED, seen.authority.failed
@@ -258,7 +242,7 @@ class Supervisor:
             yield from self._holds.clear(self.cause, seen.off_path, p)
             if self.state is State.HOLDING and self._goes_on:
                 yield Event.RESUME, Event.RESUME.value
-            if self._arm and seen.ready and self._checks.quiet:
+            if self._arm and seen.ready and self.checks.quiet:
                 yield _planned(Event.READY)
         if seen.end_mission:
             yield Event.MISSION_OVER, seen.end_mission
@@ -281,7 +265,7 @@ class Supervisor:
         source, self.state = self.state, TARGETS[self.state, event]
         self.cause = cause
         self._blind_since = self._stamp if self.state is State.BLIND else math.inf
-        finding = self._checks.finding
+        finding = self.checks.finding
         if self.state is State.BLIND:  # it goes on with its landing, or its hold, afterwards
             self._interrupted, self._failed = source, finding.name
         elif self.state is State.FAILSAFE:

@@ -122,7 +122,7 @@ class DirectFlight:
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
                 reasons = "; ".join(self.sequence.reasons) or "no reason"
                 not_armed = f"the autopilot did not arm: {reasons}"
-                against = self.mission.beyond or self.mission.not_ready or not_armed
+                against = self.mission.checks.beyond or self.mission.not_ready or not_armed
                 self.mission.give_up(plant.time, against)
             if plant.time >= self._limit:
                 self.ended_by = f"time limit of {self._limit:g} s"
