@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from uam_control.control.sample_hold import SampleHold
+from uam_control.control.sample_hold import is_new, new_hold
 
 PERIOD = 0.004
 
 
 def ticks_with_a_new_command(rate, count, first=0):
-    hold = SampleHold(rate)
-    return [i for i in range(first, first + count) if hold.due(i * PERIOD)]
+    hold = new_hold(rate)
+    return [i for i in range(first, first + count) if is_new(hold, i * PERIOD)]
 
 
 def test_without_a_rate_every_tick_is_new():
@@ -31,13 +31,13 @@ def test_the_first_tick_is_new_wherever_it_is():
 
 
 def test_a_clock_that_begins_anew_gives_a_new_command():
-    hold = SampleHold(10.0)
-    assert hold.due(5.0) and not hold.due(5.05)
-    assert hold.due(0.0)
+    hold = new_hold(10.0)
+    assert is_new(hold, 5.0) and not is_new(hold, 5.05)
+    assert is_new(hold, 0.0)
 
 
 def test_a_rate_below_one_hertz():
-    hold = SampleHold(0.5)
-    assert [hold.due(time) for time in (0.0, 1.0, 1.996, 2.0, 3.9, 4.0)] == [
+    hold = new_hold(0.5)
+    assert [is_new(hold, time) for time in (0.0, 1.0, 1.996, 2.0, 3.9, 4.0)] == [
         True, False, False, True, False, True,
     ]  # fmt: skip

@@ -37,7 +37,7 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
 )
-from uam_control.control.sample_hold import SampleHold
+from uam_control.control.sample_hold import new_hold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
@@ -267,7 +267,7 @@ class ArmController(Controller):
 
     def __init__(self, parameters: ArmLimits) -> None:
         joints = len(parameters.inertia)
-        self._hold = SampleHold(parameters.goal_rate)
+        self._hold = new_hold(parameters.goal_rate)
         self._still = still_joints(joints)
         # goals do not exist before the first tick
         to_goals = parameters.setpoint == POSITION_SERVO
@@ -275,7 +275,7 @@ class ArmController(Controller):
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> ArmArrays:
-        p, self._hold.rate = self.parameters, self.parameters.goal_rate
+        p, self._hold["rate"] = self.parameters, self.parameters.goal_rate
         to_goals = p.setpoint == POSITION_SERVO
         if not to_goals:
             self.command = self._tau
@@ -284,7 +284,7 @@ class ArmController(Controller):
             np.array(p.integral_gain, dtype=float),
             *(float(p.integral_limit), self._integral, np.array(p.torque_max, dtype=float)),
             *(self.command, to_goals, p.goal_from == REFERENCE, float(p.goal_compliance)),
-            *(self._hold.memory, self._still),
+            *(self._hold, self._still),
         )
         rows = self.errors
         self._begin = bound(begin_law, of_all, rows, rows, np.zeros((3, 3)), True)

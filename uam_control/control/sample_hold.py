@@ -2,31 +2,23 @@
 
 import numpy as np
 
-from uam_control.maths.compiled import borrowing, prepared
-from uam_control.maths.memory import Number, record
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.memory import record
 
 
-class SampleHold:
-    """Divides time into periods of 1 / rate; a command is new at the first tick of each."""
-
-    rate = Number()
-
-    def __init__(self, rate: float) -> None:
-        """rate [Hz]: of new commands; 0: at every tick."""
-        self.memory = record("last", "rate")  # last: number of the period of the last new command
-        self.memory[0] = -1, rate
-        self._is_new = prepared(is_new, self.memory, 0.0)
-
-    def due(self, time: float) -> bool:
-        """See `is_new`."""
-        return self._is_new(self.memory, time)
+def new_hold(rate: float) -> np.ndarray:
+    """Return the memory (1,) of `is_new`; rate [Hz]: of new commands, 0: at every tick."""
+    hold = record("last", "rate")  # last: number of the period of the last new command
+    hold[0] = -1, rate
+    return hold
 
 
 @borrowing
 def is_new(hold: np.ndarray, time: float) -> bool:
     """Whether a command is new at the tick of `time` [s]; call it once per tick.
 
-    hold (1,): memory of a `SampleHold`.
+    hold (1,): see `new_hold`. Time is divided into periods of 1 / rate; a command is new at the
+    first tick of each.
     """
     m = hold[0]
     if m.rate <= 0.0:

@@ -353,7 +353,7 @@ class FlightSequence:
         First it moves clear of one that is near, slowly: its setpoints may be late.
         """
         if self._clear_at is None:
-            self._clear_at = self._guidance.retreat(stamp, hurried=False)
+            self._clear_at = self._guidance.retreat(stamp)
         if stamp < self._clear_at:
             return
         stow, self._descent = self._descent.stow, None
@@ -395,7 +395,7 @@ class FlightSequence:
             guidance.stop(stamp, decision.stow and event is not Event.ARRIVED)
             self._touchdown.stay()
             if state is State.BLIND:
-                guidance.retreat(stamp)
+                guidance.retreat(stamp, hurried=True)
         elif event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:

@@ -33,9 +33,9 @@ class Guidance:
 
     `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
     (5, 6 + n): the same without attitude, with jerk and snap. `course`: what it does, by the table
-    of `course`. `scenario_time` [s]: time on the scenario, constant during a hold; `end` [s]: stamp
-    at which a descent reaches the ground, inf without one. `arrays`: what compiled functions use,
-    never replaced.
+    of `course`. `trajectory`: the path by the scenario time; one that takes its place equals it
+    then. `scenario_time` [s]: time on the scenario, constant during a hold. `arrays`: what compiled
+    functions use, never replaced.
     """
 
     scenario_time = Number()
@@ -60,7 +60,7 @@ class Guidance:
         self.arrays = GuidanceArrays(reference, motion, *ahead, self._drag, self.memory)
         self.configure(parameters)
         self._publish = bound(publish, self.arrays)
-        self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
+        self.trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
         self._clock = PathClock(stamp)
         self._rates = STEADY  # derivatives of the scenario time
         self._path = np.zeros_like(self.motion)
@@ -139,7 +139,7 @@ class Guidance:
         count = int(np.searchsorted(times, until))
         self.arrays.times[:count] = times[:count]
         motions = self.arrays.motions[:count]
-        write_motions(self._trajectory, times[:count], motions)
+        write_motions(self.trajectory, times[:count], motions)
         for motion in motions:
             self.shift(motion)
         self.memory["following"] = 0
@@ -167,15 +167,6 @@ class Guidance:
     def coming_back(self) -> bool:
         """Return whether the path is left, or about to go on after a stop; not for a plan."""
         return self.course in COMING_BACK or self._away is not None
-
-    def replace(self, trajectory: Trajectory) -> None:
-        """Follow `trajectory` from now on; it must equal the present one at the scenario time."""
-        self._trajectory = trajectory
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """Return the path as a function of the scenario time."""
-        return self._trajectory
 
     @property
     def planned(self) -> bool:
@@ -207,7 +198,7 @@ class Guidance:
         row, rows = np.zeros_like(self.motion), []
         for time in times.tolist():
             row[:] = self.motion
-            (motion or self._trajectory).write(min(time, end), row)
+            (motion or self.trajectory).write(min(time, end), row)
             rows.append(row[CHI].copy())
         return stamp + times - begin, np.array(rows)
 
@@ -296,7 +287,7 @@ class Guidance:
         """
         if self._brake is not None:
             if self.course is not Course.REST and self._below_path:
-                self.retreat(stamp, hurried=False)
+                self.retreat(stamp)
             ends = max(self._brake.end, self._clock.settled)
             if stamp < ends or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
                 if self._take(Cue.WAIT):
@@ -316,7 +307,7 @@ class Guidance:
             self._away = rest.way_back(stamp, offset, self.parameters)
         if self._plans.pop(False, None) is not None or self._arm is not None:
             time = self._clock.at(self._due)[0]
-            self._trajectory.write(time, self._path)
+            self.trajectory.write(time, self._path)
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
             self._due = max(self._due, self._arm.end)
         if self._away is not None:
@@ -347,7 +338,7 @@ class Guidance:
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
-    def retreat(self, stamp: float, hurried: bool = True) -> float:
+    def retreat(self, stamp: float, hurried: bool = False) -> float:
         """Move clear of an obstacle near the place of rest, off the path and up.
 
         `go_on` returns to the path. Level from below it: straight up the arm is caught under a
@@ -393,7 +384,7 @@ class Guidance:
 
     def _write_path(self, path: np.ndarray) -> None:
         """Write the path (5, 6 + n) at the scenario time, by the chain rule for its clock."""
-        self._trajectory.write(self.scenario_time, path)
+        self.trajectory.write(self.scenario_time, path)
         if self._rates != STEADY:
             scale(path, self._rates)
         self.shift(path)
@@ -412,5 +403,5 @@ class Guidance:
 
     def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:
         """Return the time [s] in which the path's clock stops or resumes; see `rest.ramp`."""
-        self._trajectory.write(self.scenario_time, self._path)
+        self.trajectory.write(self.scenario_time, self._path)
         return rest.ramp(self._path, self.parameters, shortest, acceleration)

@@ -190,7 +190,7 @@ class PayloadWatch:
         if window is not None and window is not self._left_out:
             self._left_out = window
             now, motion = guidance.scenario_time, guidance.motion
-            guidance.replace(WithoutDescent(guidance.trajectory, window, now, motion))
+            guidance.trajectory = WithoutDescent(guidance.trajectory, window, now, motion)
         return directive.land
 
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:

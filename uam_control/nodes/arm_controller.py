@@ -1,6 +1,8 @@
 """Node: arm law. state + reference + desired attitude of the position law → joint efforts
 or goal positions."""
 
+from functools import partial
+
 import numpy as np
 
 from uam_control.control.controllers import ArmController
@@ -59,6 +61,4 @@ class ArmControllerNode(ControllerNode):
         return self._writer.fill(stamp, tau)
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run_alone(ArmControllerNode, NAME)
+main = partial(run_alone, ArmControllerNode, NAME)  # returns the exit status

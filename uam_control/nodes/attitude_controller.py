@@ -1,5 +1,6 @@
 """Node: attitude law. state + reference + desired attitude of the position law → tau_q."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,4 @@ class AttitudeControllerNode(ControllerNode):
         return self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp)
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run_alone(AttitudeControllerNode, NAME)
+main = partial(run_alone, AttitudeControllerNode, NAME)  # returns the exit status

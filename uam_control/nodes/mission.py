@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -383,6 +384,4 @@ def warm_up(spare: Mission, takeoff: float, period: float) -> None:
     path_message(0, np.zeros(1, dtype=int), state[:1])
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run(MissionNode, NAME)
+main = partial(run, MissionNode, NAME)  # returns the exit status

@@ -1,5 +1,7 @@
 """Node: position law. state + reference → tau_p and the desired attitude for this thrust."""
 
+from functools import partial
+
 import numpy as np
 
 from uam_control.control.controllers import PositionController
@@ -24,6 +26,4 @@ class PositionControllerNode(ControllerNode):
         return self._writer.fill(stamp, reference, self.controller.attitude_reference, tau)
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run_alone(PositionControllerNode, NAME)
+main = partial(run_alone, PositionControllerNode, NAME)  # returns the exit status

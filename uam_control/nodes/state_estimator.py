@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -200,6 +201,4 @@ class StateEstimatorNode(UamNode):
             spare.imu(stamp, rest, np.array([0.0, 0.0, spare.estimator.parameters.gravity]))
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run(StateEstimatorNode, NAME)
+main = partial(run, StateEstimatorNode, NAME)  # returns the exit status

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from geometry_msgs.msg import TwistStamped
 from rcl_interfaces.srv import GetParameters
@@ -131,6 +132,4 @@ class TeleopNode(UamNode):
         return level, summary, {"twists sent": self._teleop.sent, "full stick": self._teleop.limits}
 
 
-def main() -> int:
-    """Run the node; return its exit status."""
-    return run(TeleopNode, NAME)
+main = partial(run, TeleopNode, NAME)  # returns the exit status

@@ -9,6 +9,7 @@ concerns the law as a whole.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from std_srvs.srv import SetBool, Trigger
@@ -89,6 +90,4 @@ def spin(
     spin_nodes(nodes, running, min(node.wake_up for node in nodes), at_rest)
 
 
-def main() -> int:
-    """Run the nodes; return the exit status."""
-    return run_together(make, WHOLE_BODY, spin)
+main = partial(run_together, make, WHOLE_BODY, spin)  # returns the exit status

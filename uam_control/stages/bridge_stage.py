@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from uam_control.control.sample_hold import SampleHold
+from uam_control.control.sample_hold import is_new, new_hold
 from uam_control.frames import swap_body
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Flag, Number, put, record
@@ -133,7 +133,7 @@ class BridgeStage:
         self.loop_delay, self.lift = self.measurements.loop_delay, self.measurements.lift
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self.vision = VisionPacing(sets.vision)
-        self._hold, self.kept = SampleHold(sets.setpoint.setpoint_rate), None
+        self._hold, self.kept = new_hold(sets.setpoint.setpoint_rate), None
         self.reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
@@ -239,7 +239,7 @@ class BridgeStage:
     def compiled(self) -> bool:
         """Whether its setpoints are of the kind that compiled ticks send: body rates, each tick."""
         rates = self.source.type is rates_setpoint
-        return rates and self._hold.rate <= 0.0 and not self._dry_run
+        return rates and self._hold["rate"].item() <= 0.0 and not self._dry_run
 
     @property
     def settled(self) -> bool:
@@ -286,7 +286,7 @@ class BridgeStage:
         if not flying or setpoint is None:
             self.kept = None
             return setpoint
-        if self._hold.due(now) or self.kept is None:
+        if is_new(self._hold, now) or self.kept is None:
             self.kept = setpoint
         return self.kept
 
