@@ -13,6 +13,7 @@ from uam_control.frames import swap_body
 from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, SetpointRefused
 from uam_control.setpoints.targets import AttitudeTarget
+from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import ThrustIdentification
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
@@ -116,7 +117,7 @@ class Bridge:
             number(rng) if rng.random() < 0.01 else now,
             state,
             thrust,
-            self._map.assumed_thrust(thrust),
+            thrust_of_command(thrust, *self._map.curve),
             rng.random() < 0.9,
         )
         p = self._identification.parameters

@@ -20,7 +20,7 @@ from uam_control.arm.kinematics import (
 )
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleError, chain_of, load_description
-from uam_control.vehicle.chain_reader import read_chain
+from uam_control.vehicle.chain_reader import ChainReader
 
 STEP = 1e-6
 
@@ -98,7 +98,7 @@ TILTED = """
 @pytest.fixture(scope="module")
 def tilted():
     model = mujoco.MjModel.from_xml_string(TILTED)
-    return model, read_chain(model, ("a", "b", "c"), "claw")
+    return model, ChainReader(model, ("a", "b", "c")).chain("claw")
 
 
 def test_a_tilted_offset_mount_against_mujoco(tilted):
@@ -281,7 +281,7 @@ def test_parameters_that_contradict_are_refused(change, text):
 )
 def test_what_is_no_chain_is_refused(tilted, joints, site, text):
     with pytest.raises(ValueError, match=text):
-        read_chain(tilted[0], joints, site)
+        ChainReader(tilted[0], joints).chain(site)
 
 
 def test_a_file_that_is_no_model_is_refused_in_one_line(tmp_path):

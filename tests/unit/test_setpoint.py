@@ -15,6 +15,7 @@ from uam_control.setpoints.rate_thrust_map import (
     RateThrustParameters,
     SetpointRefused,
 )
+from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
 
@@ -104,7 +105,9 @@ def test_battery_and_thrust_factor_scale_what_full_thrust_is():
     assert m.thrust_factor == 0.75
     assert thrust == pytest.approx(2.2 * 9.81 / (4 * 10.34 * 0.6))
     assert rates == pytest.approx(plain / 0.75)
-    assert m.assumed_thrust(0.5) == pytest.approx(0.5 * 4 * 10.34 * 0.8)  # without the factor
+    assert thrust_of_command(0.5, *m.curve) == pytest.approx(
+        0.5 * 4 * 10.34 * 0.8
+    )  # without the factor
     assert m.scaled(0.25, 1.5) == pytest.approx(0.375)  # the motors' curve is a straight line
 
 

@@ -20,6 +20,7 @@ from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParam
 from uam_control.setpoints.setpoint_source import SetpointSource, Situation
 from uam_control.setpoints.setpoint_types import SETPOINTS
 from uam_control.setpoints.targets import ATTITUDE as ATTITUDE_TARGET
+from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.vehicle import GRAVITY
 
 TICK = 0.004
@@ -58,7 +59,7 @@ def in_flight(
     for k in range(1, 251):
         source.note_state(TICK * k, state)
         sent = source.commanded(TICK * k, state, True, WEIGHT, REST, ATTITUDE, FLYING)
-    assert sent.thrust > 0.3 and not source.holding
+    assert sent.thrust > 0.3 and not source.hold.active
     return source
 
 
@@ -89,7 +90,7 @@ def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
                 np.testing.assert_allclose(setpoint.quaternion[[1, 2]], 0.0, atol=1e-9)
             else:
                 assert setpoint.body_rates[0] < -0.5
-    assert setpoint is None and source.holding
+    assert setpoint is None and source.hold.active
 
 
 def test_the_reason_is_logged():
@@ -173,7 +174,7 @@ def test_an_attitude_that_is_not_finite_is_refused_where_it_is_sent():
     source = in_flight(message, setpoint="attitude")
     bad = ATTITUDE * math.nan
     held = source.commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING)
-    assert message[0] == "setpoint refused: not finite" and source.holding
+    assert message[0] == "setpoint refused: not finite" and source.hold.active
     assert desired(held) == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
     assert (
         not in_flight().commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING).refused()
@@ -225,8 +226,9 @@ def test_a_released_vehicle_gets_its_own_attitude_rates_and_thrust(kind, flying)
         source.note_state(now, pushed(state, 1.0 + 0.1 * math.sin(now)))
         torque = REST + 1 if flying else None
         sent = source.commanded(now, state, flying, 2 * WEIGHT, torque, ATTITUDE, RELEASED)
-        assert not source.holding
-        newtons = source.map.assumed_thrust(sent.thrust) / source.map.assumed_thrust(flown)
+        assert not source.hold.active
+        curve = source.map.curve
+        newtons = thrust_of_command(sent.thrust, *curve) / thrust_of_command(flown, *curve)
         assert newtons == pytest.approx(1.0 + 0.1 * math.sin(now))
         if kind == "attitude":
             angles = euler_from_quaternion(swap_quaternion(sent.quaternion))
@@ -270,7 +272,8 @@ def test_thrust_and_rates_of_a_released_vehicle_are_bounded(height, lift, part):
     source.note_state(1.1, pushed(state, lift))
     sent = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
     np.testing.assert_array_equal(swap_body(sent.rates), [2.0, -2.0, 1.0])
-    newtons = source.map.assumed_thrust(sent.thrust) / source.map.assumed_thrust(flown)
+    curve = source.map.curve
+    newtons = thrust_of_command(sent.thrust, *curve) / thrust_of_command(flown, *curve)
     assert newtons == pytest.approx(part)
 
 
@@ -317,4 +320,4 @@ def test_until_the_mission_has_resumed_the_setpoint_stays(height):
     assert sent.thrust == pytest.approx(before.thrust, rel=0.05)
     source.note_state(1.4, state)
     sent = source.commanded(1.4, state, False, WEIGHT, None, ATTITUDE, FLYING)
-    assert source.holding == (height > 0.3) and (sent.thrust == 0.0) == (height < 0.3)
+    assert source.hold.active == (height > 0.3) and (sent.thrust == 0.0) == (height < 0.3)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
+from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
@@ -242,7 +243,7 @@ def test_the_map_makes_newtons_newtons(factor, newtons):
         return
     torque = np.array([0.2, -0.1, 0.02])
     rates, thrust = truth.map(np.array([0.0, 0.0, newtons]), torque, zero, zero)
-    assert factor * truth.assumed_thrust(thrust) == pytest.approx(newtons)
+    assert factor * thrust_of_command(thrust, *truth.curve) == pytest.approx(newtons)
     p = truth.parameters
     gain = np.array(p.rate_p) * np.array(p.rate_k) * p.torque_scale(load_description()) * factor
     assert gain * rates == pytest.approx(torque)

@@ -147,27 +147,21 @@ class ChainParameters(ParameterSet):
         )
 
 
+# parameter → field of the chain
+FIELDS = {
+    name: name.removeprefix("joint_").removeprefix("link_") for name in ChainParameters.specs()
+}
+
+
 def as_parameters(chain: Chain) -> dict[str, Any]:
     """Return the values of `ChainParameters` for a chain."""
-    values = {
-        "joint_offsets": chain.offsets,
-        "joint_axes": chain.axes,
-        "link_masses": chain.masses,
-        "link_centres": chain.centres,
-        "link_inertias": _upper(chain.inertias),
-        "joint_armature": chain.armature,
-        "joint_damping": chain.damping,
-        "joint_friction": chain.friction,
-        "base_mass": chain.base_mass,
-        "base_centre": chain.base_centre,
-        "base_inertia": _upper(chain.base_inertia[None]),
-    }
-    if chain.has_hand:
-        values["hand_place"], values["hand_turn"] = chain.hand_place, chain.hand_turn
-    if chain.has_hand and np.any(chain.swing_axis):
-        values["swing_axis"], values["swing_reach"] = chain.swing_axis, chain.swing_reach
-        values["swing_mass"], values["swing_centre"] = chain.swing_mass, chain.swing_centre
-    return {name: _rounded(value) for name, value in values.items()}
+    values = {name: getattr(chain, of) for name, of in FIELDS.items()}
+    values["link_inertias"] = _upper(chain.inertias)
+    values["base_inertia"] = _upper(chain.base_inertia[None])
+    absent = () if np.any(chain.swing_axis) else ("swing_",)
+    absent = absent if chain.has_hand else ("hand_", "swing_")
+    given = (name for name in values if not name.startswith(absent))
+    return {name: _rounded(values[name]) for name in given}
 
 
 def carrying(chain: Chain, mass: float) -> Chain:

@@ -128,35 +128,27 @@ class Needs:
 
         rows (3, m, 6 + n): the reference; rotation (m, 3, 3), rates (m, 3) [rad/s]: of the base.
         """
-        count, joints = len(carried), rows.shape[2] - ALPHA
-        if self.chain is None:
+        count, joints, (chain, _) = len(carried), rows.shape[2] - ALPHA, self.arm
+        if chain is None:
             unknown = np.full(count, np.nan)
             return unknown, np.full((count, joints), np.nan), unknown
         turning, gravity = np.gradient(rates, STEP, axis=0), self.vehicle.gravity
         motion = np.ascontiguousarray(rows), rotation, rates, turning, gravity
         torques, push, pull = np.empty((count, joints)), np.empty((count, 3)), np.zeros(count)
         yaw = np.empty(count)
-        _write_loads(self.chain, *motion, torques, push, yaw)
+        _write_loads(chain, *motion, torques, push, yaw)
         for mass in np.unique(carried[carried > 0.0]):
             loaded, more, turns = (np.empty_like(one) for one in (torques, push, yaw))
-            _write_loads(carrying(self.chain, mass), *motion, loaded, more, turns)
+            _write_loads(carrying(chain, mass), *motion, loaded, more, turns)
             at = carried == mass
             torques[at], yaw[at] = loaded[at], turns[at]
             pull[at] = np.linalg.norm(more - push, axis=1)[at]
         return yaw, torques, pull
 
-    @property
-    def chain(self) -> Chain | None:
-        """The arm; None for a vehicle of another physics engine, whose model is not MuJoCo's."""
-        return self._arm_and_hinge[0]
-
-    @property
-    def hinge(self) -> tuple[float, float]:
-        """Lowest and highest angle [rad] of the hinge that the hand hangs on, if any."""
-        return self._arm_and_hinge[1]
-
     @cached_property
-    def _arm_and_hinge(self) -> tuple[Chain | None, tuple[float, float]]:
+    def arm(self) -> tuple[Chain | None, tuple[float, float]]:
+        """The arm, None for a vehicle of another physics engine than MuJoCo; lowest and highest
+        angle [rad] of the hinge that the hand hangs on, if any."""
         try:
             return chain_and_hinge(self.vehicle)
         except VehicleError:

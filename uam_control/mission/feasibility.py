@@ -130,9 +130,10 @@ class Feasibility:
         place, upper = demand.position.T, [*self._motion(demand), *self._loads(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
-        if self.needs.chain is not None:
-            lowest, highest = np.column_stack([p.joint_ranges, self.needs.hinge])
-            hinge = hinge_angles(self.needs.chain, np.ascontiguousarray(demand.angles))
+        chain, ends = self.needs.arm
+        if chain is not None:
+            lowest, highest = np.column_stack([p.joint_ranges, ends])
+            hinge = hinge_angles(chain, np.ascontiguousarray(demand.angles))
             angles.append(("angle of the hand's hinge", hinge))
         upper += [(*angle, highest[i], "rad") for i, angle in enumerate(angles)]
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]

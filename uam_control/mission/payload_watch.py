@@ -37,10 +37,14 @@ SHORTEST = 1.0  # [s] of a change
 
 
 class Shift:
-    """Shift (3,) [m] of the positions of a path, with its rates; constant after each change."""
+    """Shift of the positions of a path, with its rates; constant after each change.
+
+    `value` (3,) [m]: the present one, read only.
+    """
 
     def __init__(self) -> None:
         self._values = np.zeros((MOTION_ROWS, 3))
+        self.value = self._values[CHI]
         self._goal = np.zeros(3)
         self._aimed: np.ndarray | None = None  # the array of the last change
         self._beside = False  # whether the goal is not zero
@@ -54,7 +58,7 @@ class Shift:
         if goal is self._aimed or np.array_equal(goal, self._goal):
             return
         self._aimed, self._goal, self._beside = goal, goal.copy(), bool(goal.any())
-        way = float(np.max(np.abs(goal - self._values[CHI])))
+        way = float(np.max(np.abs(goal - self.value)))
         length = max(SHORTEST, PEAK * way / SPEED)
         self._segment = Segment(stamp, self._values, goal, np.full(3, length))
 
@@ -62,11 +66,6 @@ class Shift:
     def settled(self) -> bool:
         """Return whether no change is under way."""
         return self._segment is None
-
-    @property
-    def value(self) -> np.ndarray:
-        """Return the present shift (3,) [m]; read only."""
-        return self._values[CHI]
 
     def advance(self, stamp: float) -> None:
         """Set the shift for `stamp` [s]; call it before `add`."""

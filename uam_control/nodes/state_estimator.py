@@ -62,7 +62,7 @@ class StateEstimatorNode(UamNode):
         self.parameter_set = NodeParameters(self, kind, defaults=section, derived=derived)
         self._period = vehicle.control_period
         self.stage = self._new_stage()
-        self.parameter_set.apply = self.stage.set_parameters
+        self.parameter_set.apply = self.stage.estimator.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
@@ -137,7 +137,7 @@ class StateEstimatorNode(UamNode):
             f"{stamp / SECOND:.3f} s: the estimate begins anew"
         )
         self.stage = self._new_stage()
-        self.parameter_set.apply = self.stage.set_parameters
+        self.parameter_set.apply = self.stage.estimator.set_parameters
         self._diverged_before = 0
 
     def settle(self) -> None:

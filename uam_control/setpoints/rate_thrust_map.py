@@ -210,7 +210,7 @@ class RateThrustMap:
     `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `flat`: see
     `RateThrustParameters.flat`; never replaced. `thrust_factor`: true
     thrust / thrust of the parameters' curve, 1 at first. `curve`: the numbers of that curve, as
-    `thrust_of_command` takes them.
+    `thrust_of_command` takes them; `gravity` [m/s^2]: of the vehicle.
     """
 
     _factor = Number()
@@ -227,9 +227,9 @@ class RateThrustMap:
         self.memory = record("", "factor battery")
         self._factor = 1.0
         self._vehicle = vehicle or load_description()
+        self.gravity = self._vehicle.gravity
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
         three = self.rates
-        self._thrust = prepared(thrust_of_command, 0.0, *self.curve)
         self._map = prepared(rate_thrust_map, three, three, three, three, self.flat, three)
         self._map_state = prepared(
             rate_thrust_of_state, three, three, np.zeros((3, ALPHA)), self.flat, three
@@ -244,11 +244,6 @@ class RateThrustMap:
         self._torque_scale = checked.torque_scale(self._vehicle)
         self.memory["battery"] = checked.battery_factor
         self.thrust_factor = self._factor
-
-    @property
-    def gravity(self) -> float:
-        """Gravity of the vehicle's description [m/s^2]."""
-        return self._vehicle.gravity
 
     @property
     def thrust_factor(self) -> float:
@@ -291,10 +286,6 @@ class RateThrustMap:
         p = self.flat
         curves = p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]
         return command_of_thrust(factor * thrust_of_command(command, *curves), *curves)
-
-    def assumed_thrust(self, command: float) -> float:
-        """Return the collective [N] of a normalised thrust by the curve without `thrust_factor`."""
-        return self._thrust(command, *self.curve)
 
 
 def _accepted(thrust: float) -> float:

@@ -101,11 +101,6 @@ class SetpointSource:
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._present_at = -math.inf  # [s] newest setpoint for a released vehicle
 
-    @property
-    def holding(self) -> bool:
-        """Whether the setpoint of the last tick came from the level hold."""
-        return self.hold.active
-
     def note_state(self, stamp: float, state: np.ndarray) -> None:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
         self._estimated, self._motion, self._height = stamp, state, state.item(CHI, Z)

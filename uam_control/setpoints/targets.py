@@ -36,7 +36,7 @@ RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE = 128, 7, 3  # type masks
 FLOWN = "128 (body rates), 7 (attitude), 3 (attitude and yaw rate)"
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 STILL = np.zeros(3)
-NO_RATES = np.full(3, math.nan)
+NO_RATES = np.full(3, math.nan)  # body rates [rad/s] of a setpoint that has none
 VELOCITY_IGNORED, ACCELERATION_IGNORED, YAW_RATE_IGNORED = 0x038, 0x1C0, 0x800
 FLOWN_MASKS = tuple(
     velocity | acceleration | rate
@@ -101,16 +101,8 @@ class PositionTarget(NamedTuple):
     acceleration: np.ndarray
     yaw: float
     yaw_rate: float
-
-    @property
-    def body_rates(self) -> np.ndarray:
-        """Body rates (3,) [rad/s, FLU]: NaN, it has none."""
-        return NO_RATES
-
-    @property
-    def thrust(self) -> float:
-        """NaN: the autopilot chooses the thrust."""
-        return math.nan
+    body_rates = NO_RATES
+    thrust = math.nan  # the autopilot chooses it
 
     def refused(self) -> str:
         """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
@@ -128,11 +120,7 @@ class WrenchTarget(NamedTuple):
 
     torque: np.ndarray
     thrust: float
-
-    @property
-    def body_rates(self) -> np.ndarray:
-        """Body rates (3,) [rad/s, FLU]: NaN, it has none."""
-        return NO_RATES
+    body_rates = NO_RATES
 
     def refused(self) -> str:
         """Return why no autopilot should fly it: what is not finite; "" if nothing."""

@@ -113,8 +113,8 @@ class AutopilotReport(NamedTuple):
 
 
 class AutopilotReports:
-    """Makes the reports when they are due. `last`: the newest one; `next` [ns]: when the next one
-    is due, even if nothing changes."""
+    """Makes the reports when they are due. `next` [ns]: when the next one is due, even if
+    nothing changes."""
 
     next = Number()
 
@@ -126,7 +126,6 @@ class AutopilotReports:
         self.memory = record("next")
         self.next = -1
         self._reported: tuple | None = None  # what a change of brings a report
-        self.last: AutopilotReport | None = None
 
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
@@ -136,13 +135,12 @@ class AutopilotReports:
         autopilot = self._autopilot
         since, delay = autopilot.armed_since, self._loop_delay.value
         self.next, self._reported = stamp + REPORT_PERIOD, what
-        self.last = AutopilotReport(
+        return AutopilotReport(
             *what,
             None if since is None else nanoseconds(since),
             autopilot.round_trip,
             None if math.isnan(delay) else delay,
         )
-        return self.last
 
     def settled(self, stamp: int) -> bool:
         """Return whether the autopilot is connected at the tick `stamp` [ns], and all is reported

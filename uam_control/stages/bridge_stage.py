@@ -224,7 +224,7 @@ class BridgeStage:
         self._send(now, setpoint)
         airborne = flying and situation.armed
         self.factor = factor = self.map.thrust_factor
-        looped = airborne and setpoint is not None and not self.source.holding
+        looped = airborne and setpoint is not None and not self.source.hold.active
         sent = Sent(rates, thrust, looped, airborne and not situation.let_go, factor)
         step = min(max(stamp - self.last, 0) / SECOND, LONGEST_STEP)
         found = self.measurements.update(now, step, state, sent, self.map.curve)

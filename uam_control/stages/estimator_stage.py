@@ -126,10 +126,6 @@ class EstimatorStage:
         """Return whether no states come because the estimate has diverged."""
         return self.diverged > 0 and self.stamp < self.held_until
 
-    def set_parameters(self, parameters: BaseParameters) -> None:
-        """Use `parameters` (validated) from the next sample on."""
-        self.estimator.set_parameters(parameters)
-
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """See `take_pose`."""
         self._pose(stamp, position, quaternion)

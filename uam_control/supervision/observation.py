@@ -75,10 +75,7 @@ class Readings:
     wall clock, 1 − real-time factor of a simulation. `values`: all NUMBERS.
     """
 
-    battery, temperature, missed_ticks, slower, contradiction, lift = (Number() for _ in range(6))
-    throttle, mocap_age, mocap_still, joint_age, payload_age = (Number() for _ in range(5))
-    controller_age, pose_controller_age, autopilot_age = (Number() for _ in range(3))
-    round_trip, loop_delay, stamp = (Number() for _ in range(3))
+    vars().update({name: Number() for name in NUMBERS})
 
     def __init__(self, **known: float | np.ndarray) -> None:
         """known: by name; the others are unknown."""

@@ -159,7 +159,8 @@ class Supervisor:
         """Return the decision for the state, by the policy of docs/supervision.md."""
         p, state = self._parameters, self.state
         guide, keep, stow = Guide.NOTHING, True, False
-        landing = state is State.LANDING or (state is State.BLIND and self._lands_on)
+        lands_on = state is State.BLIND and self._interrupted is State.LANDING
+        landing = state is State.LANDING or lands_on
         if state in (State.TAKING_OFF, State.FLYING) or (self._planned and landing):
             guide = Guide.SCENARIO
         elif landing:
@@ -222,8 +223,9 @@ class Supervisor:
             yield self._agrees(), f"{self._failed} agrees again"
         if command is not None and not self.refusal(command, seen):
             event = self._event(command, seen)
-            if self.state is State.RELEASED:
-                self._regain()
+            if self.state is State.RELEASED:  # the scenario goes on if it is regained in time
+                self._regains, self._regained = self._regains + 1, self._stamp
+                self.decision = self._decide()
             else:
                 yield event, event.value
         if level is Level.LAND:
@@ -295,11 +297,6 @@ class Supervisor:
                 self.cause, self._regained = cause, -math.inf
                 self.decision = self._decide()
 
-    @property
-    def _lands_on(self) -> bool:
-        """Whether it became blind in a landing."""
-        return self._interrupted is State.LANDING
-
     def _flies_on(self, finding: ExceededLimit, seen: Observation) -> bool:
         """Whether the vehicle flies blind first.
 
@@ -314,12 +311,6 @@ class Supervisor:
         """Return the event of poses that agree again: a take-off given up, or a landing, lands."""
         landing = self._interrupted in (State.TAKING_OFF, State.LANDING) and not self._planned
         return Event.AGREES_TO_LAND if landing else Event.AGREES
-
-    def _regain(self) -> None:
-        """Ask for the released vehicle; the scenario goes on if it is regained in time."""
-        self._regains += 1
-        self._regained = self._stamp
-        self.decision = self._decide()
 
     def _event(self, command: OperatorCommand, seen: Observation) -> Event:
         """Return the event of a command; DISARM on the ground has its own event."""

@@ -52,21 +52,11 @@ def chain_and_hinge(vehicle: VehicleDescription) -> tuple[Chain, tuple[float, fl
     Infinite for a hand without hinge, or without ends of it. Raises VehicleError, see `chain_of`.
     """
     try:
-        reader = _reader(model_spec(vehicle).compile(), vehicle.joint_names)
+        reader = ChainReader(model_spec(vehicle).compile(), vehicle.joint_names)
         return reader.chain(vehicle.end_effector), reader.hinge
     except ValueError as error:
         reason = " ".join(str(error).removeprefix("Error: ").split())
         raise VehicleError(f"{vehicle.model}: {reason}") from None
-
-
-def read_chain(model: mujoco.MjModel, joints: tuple[str, ...], end_effector: str) -> Chain:
-    """Return the arm of a compiled model.
-
-    joints: base to tip; end_effector: a site, "" for one of `HANDS`. Raises ValueError for
-    joints that are no serial chain of 1 to 7 hinges on the body `base`, and for a site that the
-    last link does not carry.
-    """
-    return _reader(model, joints).chain(end_effector)
 
 
 def hand_site(model: mujoco.MjModel, end_effector: str) -> int:
@@ -79,24 +69,22 @@ def hand_site(model: mujoco.MjModel, end_effector: str) -> int:
     return next((site for site in found if site >= 0), -1)
 
 
-def _reader(model: mujoco.MjModel, joints: tuple[str, ...]) -> _Reader:
-    places = (model.jnt_axis, model.jnt_pos, model.body_pos, model.body_quat, model.body_inertia)
-    if not all(np.isfinite(one).all() for one in places):
-        raise ValueError("an axis, a place or an inertia is not finite")
-    return _Reader(model, joints)
+class ChainReader:
+    """Reads the arm of a compiled model, with every joint at zero, in the base's frame.
 
-
-class _Reader:
-    """A model with every joint at zero; all that it returns is in the base's frame.
-
-    hinge: range [rad] of the hinge that the hand hangs on, known with the chain.
+    `hinge`: range [rad] of the hinge that the hand hangs on, known with the chain. Raises
+    ValueError for joints that are no serial chain of 1 to 7 hinges on the body `base`.
     """
 
     hinge = -np.inf, np.inf
 
     def __init__(self, model: mujoco.MjModel, joints: tuple[str, ...]) -> None:
+        """joints: their names, base to tip."""
         import mujoco
 
+        numbers = model.jnt_axis, model.jnt_pos, model.body_pos, model.body_quat, model.body_inertia
+        if not all(np.isfinite(one).all() for one in numbers):
+            raise ValueError("an axis, a place or an inertia is not finite")
         kinds = mujoco.mjtJoint
         self._model, self._hinge = model, int(kinds.mjJNT_HINGE)
         self._base = self._id(mujoco.mjtObj.mjOBJ_BODY, BASE)
@@ -110,7 +98,7 @@ class _Reader:
         self._owner = self._owners()
 
     def chain(self, end_effector: str) -> Chain:
-        """Return the chain; see `read_chain`."""
+        """Return the chain; end_effector: a site on the last link, "" for one of `HANDS`."""
         model, data, count = self._model, self._data, len(self._joints)
         places = self._inside(data.xanchor[self._joints])
         hand = self._hand(end_effector, places[-1])

@@ -340,7 +340,7 @@ class MavlinkBridgeNode(UamNode):
             "link open": link.transport.connected,
             "frames dropped": link.transport.dropped,
             "ground station held back": self._station.held_back if self._station else None,
-            "level hold": self.stage.source.holding,
+            "level hold": self.stage.source.hold.active,
             "adopted": "; ".join(self._adopted),
             **report(link),
             **({} if self._imu is None else self._imu.values()),

@@ -32,7 +32,14 @@ from uam_control.coordinates import (
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
-from uam_control.mission.scenarios.hand_motion import BEFORE, Task, Unreachable, following, holding
+from uam_control.mission.scenarios.hand_motion import (
+    BEFORE,
+    Task,
+    Unreachable,
+    following,
+    holding,
+    level_at_origin,
+)
 from uam_control.mission.scenarios.ramps import at_rest
 from uam_control.mission.scenarios.reference_kinds import Middle, cut, keys_of, legs
 from uam_control.mission.scenarios.route import Leg
@@ -183,7 +190,7 @@ class _Reader:
         curve = joined([part.path for part in parts])
         above = np.zeros_like(middle)
         above[POSITION] = middle[POSITION] - (0.0, 0.0, 1.0)
-        turned = _at_origin(middle)
+        turned = level_at_origin(middle[None])
         turned[:, YAW] -= hands(self._flyer.chain, turned)[0, HEADING] - middle[YAW]
         above[POSITION] -= hands(self._flyer.chain, turned)[0, POSITION]
         base = curve.shifted(0.0, above)
@@ -257,7 +264,7 @@ class _Reader:
         """Return whether `columns` of chi (6 + n,) can change each of `rows` of the hand."""
         if len(columns) < len(rows):
             return False
-        slopes = jacobians(self._flyer.chain, _at_origin(chi), columns)[0, rows]
+        slopes = jacobians(self._flyer.chain, level_at_origin(chi[None]), columns)[0, rows]
         return bool(np.linalg.svd(slopes, compute_uv=False)[len(rows) - 1] > TURNS)
 
     def _elevation(self, chi: np.ndarray) -> float | None:
@@ -266,7 +273,7 @@ class _Reader:
         if entry.has("elevation_deg"):
             return math.radians(entry.number("elevation_deg"))
         if entry.has("elevation") and entry.one_of("elevation", (POSTURE,)):
-            return float(hands(self._flyer.chain, _at_origin(chi))[0, ELEVATION])
+            return float(hands(self._flyer.chain, level_at_origin(chi[None]))[0, ELEVATION])
         return None
 
     def _posture(self, swing: float) -> np.ndarray:
@@ -295,10 +302,3 @@ class _Reader:
         chi = np.zeros(len(coordinates(len(posture))))
         chi[ARM] = posture
         return Middle(chi, self._ranges)
-
-
-def _at_origin(chi: np.ndarray) -> np.ndarray:
-    """Return chi (1, 6 + n) of a level base at the origin, with the yaw and arm of chi (6 + n,)."""
-    found = chi[None].copy()
-    found[:, :YAW] = 0.0
-    return found

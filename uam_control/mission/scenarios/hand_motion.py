@@ -104,7 +104,7 @@ def _solved(
         wanted = _wanted(task, times)
         chi = begun = _begun(wanted, flyer)
         if base is None:
-            chi[:, POSITION] -= hands(flyer.chain, _placed(chi))[:, POSITION]
+            chi[:, POSITION] -= hands(flyer.chain, level_at_origin(chi))[:, POSITION]
         else:
             chi[:, POSITION] = _wanted(Task(base, False, False, ()), times)[:, POSITION]
         least = math.inf
@@ -143,14 +143,14 @@ def _begun(wanted: np.ndarray, flyer: Flyer) -> np.ndarray:
     """Return chi (m, 6 + n) of level bases whose hand, in the posture, has the heading `wanted`."""
     chi = wanted.copy()
     chi[:, PITCH] = 0.0  # the task's elevation
-    level = _placed(chi)
+    level = level_at_origin(chi)
     level[:, YAW] = 0.0
     chi[:, YAW] -= np.unwrap(hands(flyer.chain, level)[:, HEADING])
     return chi
 
 
-def _placed(chi: np.ndarray) -> np.ndarray:
-    """Return chi (m, 6 + n) of level bases at the origin."""
+def level_at_origin(chi: np.ndarray) -> np.ndarray:
+    """Return chi (m, 6 + n) of level bases at the origin, with their yaw and arm."""
     found = chi.copy()
     found[:, POSITION], found[:, ROLL:YAW] = 0.0, 0.0
     return found
