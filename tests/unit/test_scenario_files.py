@@ -72,7 +72,7 @@ def test_the_papers_scenario():
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
             "moves: [{coordinate: roll, from: 0, until: 1, to: 1}]",
-            "coordinate: 'roll', allowed",
+            "coordinate: 'roll' is not one of x",
         ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"

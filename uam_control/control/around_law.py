@@ -23,10 +23,10 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     complete_and_limit,
     complete_effort,
-    lead_attitude,
     limit_torque,
     take_known_load,
     turn_level,
+    wash_out,
 )
 from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
@@ -168,20 +168,31 @@ def begin_attitude(
     attitude_reference: np.ndarray,
     dt: float,
 ) -> None:
-    """Write the errors of the attitude law: tracking errors, arm's moment, prediction."""
+    """Write the errors of the attitude law: tracking errors, arm's moment, prediction.
+
+    The desired body rates of roll and pitch move with their feedforward, e_q with its rate. The
+    measured body rates stay: they cancel in the setpoint. Yaw stays as it is: the rotors' weak
+    moment about yaw leaves no room for more gain on its rate (docs/tuning.md).
+    """
     begin_law(a.all, state, reference, attitude_reference, True)
+    errors, ahead = a.all.errors, a.prediction[0].ahead
     if a.rates > 0:
         planned = 1.0 if a.rates == 1 else 0.0
         for i in range(ROLL, ALPHA):
-            a.all.errors[E_DOT, i] = state[CHI_DOT, i] - planned * reference[CHI_DOT, i]
-            a.all.errors[FEEDFORWARD, i] = planned * reference[CHI_DDOT, i]
+            errors[E_DOT, i] = state[CHI_DOT, i] - planned * reference[CHI_DOT, i]
+            errors[FEEDFORWARD, i] = planned * reference[CHI_DDOT, i]
     if a.load.on:
         # the law's own inertia, that of vehicle and arm, has the angular acceleration already
         angles = state[CHI, ALPHA:] if a.measured else reference[CHI, ALPHA:]
         moment = arm_load(a.load, reference, angles, False)
         for i in range(3):
             a.turn[i] = moment[i] / a.inertia[i]
-    lead_attitude(a.all.errors, a.prediction[0].ahead, a.turn, a.washout, dt, a.slow)
+    for i in range(ROLL, YAW):
+        errors[E, i] += ahead * errors[E_DOT, i]
+        errors[E_DOT, i] -= ahead * errors[FEEDFORWARD, i]
+    for i in range(len(a.turn)):
+        errors[FEEDFORWARD, ROLL + i] += a.turn[i]
+    wash_out(errors[FEEDFORWARD, ROLL:ALPHA], a.washout, dt, a.slow)
 
 
 @borrowing

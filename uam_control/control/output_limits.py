@@ -8,8 +8,7 @@ import numpy as np
 
 from uam_control.control.arm_load import ArmLoadParameters
 from uam_control.control.hand_steering import HandParameters
-from uam_control.coordinates import ALPHA, CHI_DOT, ROLL, YAW, X, Z
-from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
+from uam_control.coordinates import CHI_DOT, X, Z
 from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import (
     TINY,
@@ -216,32 +215,6 @@ def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.nd
             slow[i] = feedforward[i] if corner[i] > 0.0 else 0.0
         slow[i] += (1.0 - math.exp(-corner[i] * dt)) * (feedforward[i] - slow[i])
         feedforward[i] -= slow[i]
-
-
-@borrowing
-def lead_attitude(
-    errors: np.ndarray,
-    ahead: float,
-    more: np.ndarray,
-    corner: np.ndarray,
-    dt: float,
-    slow: np.ndarray,
-) -> None:
-    """Carry the attitude's columns of errors (3, 6 + n) on by `ahead` [s], add the arm's moment.
-
-    more (3,) [rad/s^2]: the moment per inertia, added to the feedforward; corner (3,), dt,
-    slow (3,): of the high-pass on it, see `wash_out`.
-
-    The desired body rates of roll and pitch move with their feedforward, e_q with its rate. The
-    measured body rates stay: they cancel in the setpoint. Yaw stays as it is: the rotors' weak
-    moment about yaw leaves no room for more gain on its rate (docs/tuning.md).
-    """
-    for i in range(ROLL, YAW):
-        errors[E, i] += ahead * errors[E_DOT, i]
-        errors[E_DOT, i] -= ahead * errors[FEEDFORWARD, i]
-    for i in range(len(more)):
-        errors[FEEDFORWARD, ROLL + i] += more[i]
-    wash_out(errors[FEEDFORWARD, ROLL:ALPHA], corner, dt, slow)
 
 
 @borrowing

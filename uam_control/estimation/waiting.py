@@ -9,30 +9,21 @@ SAME = 1e-6  # s, between stamps of the same moment: the unit of MAVLink
 
 
 @jit
-def make_room(queue: np.ndarray, count: int, stamp: float) -> int:
-    """Make room for a sample of `stamp` [s] among the `count` that wait; return its row.
+def insert(
+    queue: np.ndarray, count: int, stamp: float, first: np.ndarray, second: np.ndarray
+) -> int:
+    """Let a sample of `stamp` [s] wait among `count`; return how many wait.
 
-    queue (m, w), m > count: the stamp of a sample first. Equal stamps stay in order of arrival.
+    queue (m, w): in a row the stamp of a sample and its two vectors; w = 1 + len(first) +
+    len(second). Equal stamps stay in order of arrival. If full, it forgets its oldest.
     """
-    place = count
+    if count == len(queue):
+        count = drop_first(queue, count)
+    place, middle = count, 1 + len(first)
     while place and queue[place - 1, 0] > stamp:
         queue[place] = queue[place - 1]
         place -= 1
     queue[place, 0] = stamp
-    return place
-
-
-@jit
-def insert(
-    queue: np.ndarray, count: int, stamp: float, first: np.ndarray, second: np.ndarray
-) -> int:
-    """Let a sample of `stamp` [s] wait, two vectors in a row; return how many wait.
-
-    queue (m, w): see `make_room`; w = 1 + len(first) + len(second). If full, it forgets its oldest.
-    """
-    if count == len(queue):
-        count = drop_first(queue, count)
-    place, middle = make_room(queue, count, stamp), 1 + len(first)
     queue[place, 1:middle] = first
     queue[place, middle:] = second
     return count + 1

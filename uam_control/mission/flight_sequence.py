@@ -162,7 +162,7 @@ class FlightSequence:
     @property
     def grasps(self) -> list[GraspDecision]:
         """Return all decisions about the payload so far, in order."""
-        return self._watch.decisions if self._watch is not None else []
+        return self._watch.executive.decisions if self._watch is not None else []
 
     @property
     def delay(self) -> float:
@@ -304,8 +304,8 @@ class FlightSequence:
             watch.interrupt()
             return
         self._over = self._over or watch.step(stamp, seen.state, seen.readings)
-        if watch.decisions:
-            _, output.grasp, output.attempt, output.grasp_text = watch.decisions[-1]
+        if decisions := watch.executive.decisions:
+            _, output.grasp, output.attempt, output.grasp_text = decisions[-1]
 
     def _follow(self, stamp: float, decision: Decision) -> None:
         """Apply the supervisor's decision."""
@@ -462,12 +462,13 @@ class FlightSequence:
 
     def _magnet_on(self, decision: Decision) -> bool:
         """Return the overriding value until the scenario switches, else the scenario's value."""
-        desired = self._scenario_magnet() or (self._watch is not None and self._watch.grip)
+        watch = self._watch
+        desired = self._scenario_magnet() or (watch is not None and watch.executive.directive.grip)
         given = self._override.value(desired)
         if given is not None:
             return given
         down = self._beside or decision.guide is Guide.DESCEND
-        if down and self._watch is not None and self._watch.standing:
+        if down and watch is not None and watch.standing:
             return False  # the arm would pull on the payload's stand
         left = self.output.grasp in (Grasp.GIVEN_UP, Grasp.ABSENT)
         return desired and decision.keep_magnet and not left

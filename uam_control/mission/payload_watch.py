@@ -12,7 +12,6 @@ from uam_control.arm.hand import shoulder
 from uam_control.coordinates import ALPHA, CHI, MOTION_ROWS, POSITION, Z
 from uam_control.grasp import (
     Grasp,
-    GraspDecision,
     GraspExecutive,
     GraspWindow,
     Sight,
@@ -132,11 +131,6 @@ class PayloadWatch:
         grips = [self._tool_at(window.grip)[:Z] for window in windows]
         self._stands = [*grips, *_raised(scenario.environment or ())]
 
-    @property
-    def decisions(self) -> list[GraspDecision]:
-        """Return the decisions so far."""
-        return self.executive.decisions
-
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = self.executive.parameters = parameters
@@ -153,11 +147,6 @@ class PayloadWatch:
     def settled(self) -> bool:
         """Whether the path's shift is constant."""
         return self._shift.settled
-
-    @property
-    def grip(self) -> bool:
-        """Whether the tool is on before the scenario switches it on."""
-        return self.executive.directive.grip
 
     @property
     def standing(self) -> bool:

@@ -56,6 +56,7 @@ from uam_control.stages.timing import Timing
 from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
+from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_control.vehicle import VehicleDescription
 
 
@@ -85,11 +86,7 @@ class ControlTick:
         self.whole = WholeBodyStage(laws) if whole else None
         self.stages = [*SENSING, *((WHOLE_BODY,) if whole else MODULAR), *SENDING]
         self.measured_delay = MeasuredDelay(self.attitude.controller)
-        self.laws: dict[str, LawStage] = {
-            "position": self.position,
-            "attitude": self.attitude,
-            "arm": self.arm,
-        }
+        self.laws = dict(zip(SUBSYSTEMS, laws, strict=True))
         laws = [one.controller.arrays.all for one in self.laws.values()]
         command, taus = self.arm.controller.command, tuple(one.tau for one in laws)
         self.signals = Signals.at_rest(self.estimator.state, command, taus)

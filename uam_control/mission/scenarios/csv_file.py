@@ -103,7 +103,8 @@ class _Table:
         """Read and check the header and the numbers."""
         self.file = file
         self._table = CsvTable(file, ScenarioError)
-        self._written = _names(self._table, joints)
+        self._groups = {**GROUPS, "arm": arm_coordinates(joints)}
+        self._written = _names(self._table, self._groups)
         self._names = list(self._written)
         numbers = np.array(self._table.numbers(self._written.values()))
         if len(numbers) < 2:
@@ -140,12 +141,7 @@ class _Table:
 
     def columns(self, group: str) -> np.ndarray | None:
         """Return the columns of a group (m, k), None if the file does not have it."""
-        if GROUPS[group][0] not in self._names:
-            return None
-        return np.column_stack([self._column(name) for name in GROUPS[group]])
-
-    def joints(self, names: tuple[str, ...]) -> np.ndarray | None:
-        """Return the joint angles (m, n) [rad], None without."""
+        names = self._groups[group]
         if names[0] not in self._names:
             return None
         return np.column_stack([self._column(name) for name in names])
@@ -186,14 +182,12 @@ class _Table:
         return self._numbers[:, self._names.index(name)]
 
 
-def _names(table: CsvTable, joints: int) -> dict[str, str]:
+def _names(table: CsvTable, groups: dict[str, tuple[str, ...]]) -> dict[str, str]:
     """Return our name → name in the file, of the columns in use; raise ScenarioError."""
 
     def refused(text: str) -> ValueError:
         return table.error(table.header_line, text)
 
-    arm = arm_coordinates(joints)
-    groups = {**GROUPS, "arm": arm}
     known = {"t"}.union(*groups.values())
     found: dict[str, str] = {}
     for written in table.header:
@@ -241,7 +235,7 @@ def _path(
         notes.append(f"{table.file.name}: dyaw does not fit yaw and is not used")
         turning = None
     names = arm_coordinates(len(vehicle.joints))
-    angles = table.joints(names)
+    angles = table.columns("arm")
     if angles is not None:
         _check_angles(table, angles, vehicle, names)
     else:
@@ -292,7 +286,7 @@ def _grip(
     names = arm_coordinates(len(vehicle.joints))
     values = dict(zip("xyz", table.columns("position").T, strict=True))
     values |= {"yaw": _yaw(table)[:, 0]}
-    if (angles := table.joints(names)) is not None:
+    if (angles := table.columns("arm")) is not None:
         values |= dict(zip(names, angles.T, strict=True))
     rests = between_rests(times, values)
     picks = sum(switched for _, switched in switches)

@@ -54,9 +54,7 @@ def keys_of(kind: str) -> tuple[str, ...]:
 
 def legs(entry: Section, middle: Middle) -> tuple[Leg, ...]:
     """Return the trajectory of the entry, from rest to rest. Raises the section's error."""
-    kind = entry.text("kind")
-    if kind not in KINDS:
-        raise entry.error("kind", f"{kind!r}, allowed: {', '.join(KINDS)}")
+    kind = entry.one_of("kind", KINDS)
     entry.only(keys_of(kind))
     pose = middle.chi.copy()
     if "arm_deg" in entry.values:
@@ -138,10 +136,8 @@ def _sweeps(entry: Section, middle: Middle) -> tuple[Harmonic, ...]:
     names, found = arm_coordinates(len(middle.joints)), []
     for one in entry.entries("sweep", True):
         one.only(("joint", "amplitude_deg", "cycles"))
-        joint = one.text("joint")
-        if joint not in names:
-            raise one.error("joint", f"{joint!r}, allowed: {', '.join(names)}")
-        i, amplitude = names.index(joint), math.radians(one.number("amplitude_deg"))
+        i = names.index(one.one_of("joint", names))
+        amplitude = math.radians(one.number("amplitude_deg"))
         angles = middle.chi[ARM].copy()
         low, high = angles.copy(), angles.copy()
         low[i], high[i] = angles[i] - abs(amplitude), angles[i] + abs(amplitude)

@@ -127,9 +127,7 @@ def _along_route(
     for key in top.values:
         if key not in ("description", "arm_start", "trajectory", "end", ENVIRONMENT):
             raise top.error(key, "not together with a trajectory alone; give moves and landing")
-    end = top.text("end", default=RETURN)
-    if end not in (RETURN, LAND):
-        raise top.error("end", f"{end!r}, allowed: {RETURN}, {LAND}")
+    end = top.one_of("end", (RETURN, LAND), default=RETURN)
     end = end if options.end == AS_SCENARIO else options.end
     entry = top.section("trajectory")
     if "at" in entry.values:
@@ -293,12 +291,8 @@ def _moves(top: Section, vehicle: VehicleDescription, landing: Landing) -> tuple
 
 
 def _move(entry: Section, vehicle: VehicleDescription) -> Move:
-    coordinate = entry.text("coordinate")
     allowed = [c for c in vehicle.coordinates if c not in ("roll", "pitch")]
-    if coordinate not in allowed:
-        raise ScenarioError(
-            f"{entry.where}.coordinate: {coordinate!r}, allowed: {', '.join(allowed)}"
-        )
+    coordinate = entry.one_of("coordinate", allowed)
     length = coordinate in ("x", "y", "z")
     entry.only(("coordinate", "from", "until", "to" if length else "to_deg"))
     target = entry.number("to") if length else _angle(entry, "to_deg", coordinate, vehicle)
