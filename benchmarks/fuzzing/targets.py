@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import socket
 from collections import Counter, deque
@@ -14,7 +15,7 @@ from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, SetpointRefused
 from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.setpoints.thrust_curve import thrust_of_command
-from uam_control.setpoints.thrust_identification import ThrustIdentification
+from uam_control.setpoints.thrust_identification import ThrustIdentification, identify
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
@@ -113,14 +114,13 @@ class Bridge:
         require(bool(np.all(np.abs(rates) <= limit)), f"rates {rates} of {values.tolist()}")
         if wild:
             self._identification.switch(number(rng), rng.random() < 0.5)
-        factor = self._map.thrust_factor = self._identification.update(
-            number(rng) if rng.random() < 0.01 else now,
-            state,
-            thrust,
-            thrust_of_command(thrust, *self._map.curve),
-            rng.random() < 0.9,
+        one, time = self._identification, number(rng) if rng.random() < 0.01 else now
+        assumed = thrust_of_command(thrust, *self._map.curve)
+        one.follow_magnet(time, math.isfinite(time + assumed))
+        factor = self._map.thrust_factor = identify(
+            time, state, thrust, assumed, rng.random() < 0.9, one.record, one.memory
         )
-        p = self._identification.parameters
+        p = one.parameters
         require(p.factor_min <= factor <= p.factor_max, f"thrust factor {factor}")
         self._link.send_setpoint(AttitudeTarget.of_rates(swap_body(rates), thrust), now)
 

@@ -13,6 +13,7 @@ from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
+    identify,
 )
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
@@ -22,12 +23,24 @@ MASS, GRAVITY = 2.2, 9.81
 FULL = 4 * 10.34
 
 
+class Identification(ThrustIdentification):
+    """Ticks in the order of the bridge: the magnet's states, then the factor."""
+
+    @property
+    def factor(self):
+        return float(self.memory[0].factor)
+
+    def update(self, time, state, command, assumed, flying):
+        self.follow_magnet(time, math.isfinite(time + assumed + command))
+        return identify(time, state, command, assumed, flying, self.record, self.memory)
+
+
 class Hover:
     """A vehicle whose motors give `truth` of the assumed thrust, under a perfect position law."""
 
     def __init__(self, truth=0.85, noise=0.0, **parameters):
         given = ThrustIdentificationParameters.of(load_description(), parameters)
-        self.identification = ThrustIdentification(given)
+        self.identification = Identification(given)
         self.truth, self.noise = truth, noise
         self.random = np.random.default_rng(3)
         self.state = np.zeros((3, 8))
@@ -110,7 +123,7 @@ def test_the_on_and_off_of_yaml_are_understood(yaml):
 
 
 def test_wrong_parameters_leave_the_old_ones():
-    identification = ThrustIdentification()
+    identification = Identification()
     with pytest.raises(ParameterError, match="identification_mass"):
         identification.configure(ThrustIdentificationParameters(identification_mass=math.nan))
     assert identification.parameters == ThrustIdentificationParameters.of(load_description())
@@ -203,7 +216,7 @@ tick = st.tuples(
 @settings(max_examples=60, deadline=None)
 @given(st.lists(tick, min_size=1, max_size=60))
 def test_whatever_comes_in_the_factor_stays_within_bounds_and_slew(ticks):
-    identification = ThrustIdentification()
+    identification = Identification()
     p = identification.parameters
     identification.update(0.0, np.zeros((3, 8)), 0.0, 0.0, False)
     state, time = np.zeros((3, 8)), 0.0

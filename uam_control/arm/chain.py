@@ -108,7 +108,6 @@ class ChainParameters(ParameterSet):
     )
 
     def check_together(self) -> None:
-        """See `ParameterSet.check_together`."""
         super().check_together()
         n, per_joint = len(self.link_masses), {
             "joint_offsets": 3, "joint_axes": 3, "link_centres": 3, "link_inertias": 6,

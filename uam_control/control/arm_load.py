@@ -40,7 +40,6 @@ class ArmLoadParameters(ChainParameters):
     )
 
     def check_together(self) -> None:
-        """See `ParameterSet.check_together`."""
         super().check_together()
         if self.arm_feedforward and not self.link_masses:
             raise ParameterError("arm_feedforward: needs link_masses, the mass of each link")

@@ -79,7 +79,6 @@ class PositionLimits(ParameterSet):
     )
 
     def check_together(self) -> None:
-        """See `ParameterSet.check_together`."""
         super().check_together()
         if self.thrust_min > self.thrust_max:
             raise ParameterError(

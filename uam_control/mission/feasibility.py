@@ -278,10 +278,6 @@ class Feasibility:
         except InfeasibleReference:
             return _slowed(self, scenario)
 
-    def demand(self, scenario: Scenario) -> Demand:
-        """Return what a flight from the origin needs, from the take-off to the landing."""
-        return self._planned(_Planned(scenario), slice(None))
-
     def _planned(self, flight: _Planned, part: slice) -> Demand:
         """Return what a part of a flight needs."""
         times = flight.times[part]

@@ -125,11 +125,11 @@ class FlightSequence:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
         self._begin(self._parameters)
         self._seen, self._stamp = None, 0.0
-        self._pre_arm.permission.take(None)
+        self._pre_arm.checklist = None
 
     def checklist(self, report: ChecklistReport) -> None:
         """Take the newest state of the checklist; it counts where it is required."""
-        self._pre_arm.permission.take(report)
+        self._pre_arm.checklist = report
 
     def preflight(self) -> tuple[PreflightCheck, ...]:
         """Return the pre-arm report of the newest step; () before the first one."""
@@ -200,7 +200,7 @@ class FlightSequence:
         if output.state is not State.DISARMED:
             if guidance is not None:
                 guidance.advance(stamp)
-                self._watch.advance(stamp)
+                self._watch.shift.advance(stamp)
             seen = self._observe(stamp, state, armed_since, readings or Readings())
             seen.authority, self._seen = authority or NOBODY, seen
             command, goal = self._requests.popleft() if self._requests else (None, None)
@@ -230,7 +230,7 @@ class FlightSequence:
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state, armed_since is not None)
             elif output.state is State.GROUNDED and armed_since is None:
-                if refusal := self._pre_arm.permission.refusal(stamp):  # it is taken back
+                if refusal := self._pre_arm.refusal(stamp):  # it is taken back
                     self.give_up(stamp, refusal)
         if self._end is None and self._fell_since < math.inf:
             deadline = self._fell_since + self._parameters.failsafe_timeout
@@ -264,7 +264,7 @@ class FlightSequence:
         if self._start.dry_run:
             self._ground_pose.dry_run(output, state)
         else:
-            looks = not armed and self._pre_arm.permission.commands(self._stamp)
+            looks = not armed and self._pre_arm.hand_check(self._stamp)
             self._ground_pose.hand_check(output, state, looks)
 
     def _observe(

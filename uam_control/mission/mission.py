@@ -178,7 +178,7 @@ class Mission(FlightSequence):
             and decision is self._followed
             and supervisor.calm
             and guidance.on_path(self._stamp)
-            and self._watch.settled
+            and self._watch.shift.settled
             and self._touchdown.idle
             and not (ended or self._requests or self._override.given)
             and self._standing is None

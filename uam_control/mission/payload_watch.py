@@ -107,7 +107,7 @@ class WithoutDescent:
 class PayloadWatch:
     """The executive of a flight, stepped at its own period while the scenario is flown.
 
-    `due_from` [s]: scenario time from which on it is stepped.
+    `due_from` [s]: scenario time from which on it is stepped; `shift`: of the path.
     """
 
     _stepped, _period, due_from = Number(), Number(), Number()
@@ -120,8 +120,8 @@ class PayloadWatch:
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
         self.configure(parameters)
-        self._shift = Shift()
-        guidance.shift, guidance.clear = self._shift.add, self.clear
+        self.shift = Shift()
+        guidance.shift, guidance.clear = self.shift.add, self.clear
         self._stepped = -math.inf  # stamp [s]
         self._period = self.executive.period
         self._due = prepared(due, self.memory, 0.0, 0.0)
@@ -138,15 +138,6 @@ class PayloadWatch:
         known = self._chain.has_hand and len(self._chain.masses) == joints
         self._hand = partial(hand_and_levers, self._chain) if known else None
         self._loaded = shoulder(self._chain) if known else 0  # a yaw joint's lever is zero
-
-    def advance(self, stamp: float) -> None:
-        """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""
-        self._shift.advance(stamp)
-
-    @property
-    def settled(self) -> bool:
-        """Whether the path's shift is constant."""
-        return self._shift.settled
 
     @property
     def standing(self) -> bool:
@@ -173,7 +164,7 @@ class PayloadWatch:
         directive = executive.step(self._sight(stamp, state, readings))
         self._period = executive.period
         guidance.pace(stamp, directive.pace)
-        self._shift.aim(stamp, directive.shift)
+        self.shift.aim(stamp, directive.shift)
         window = directive.without_descent
         if window is not None and window is not self._left_out:
             self._left_out = window
@@ -212,7 +203,7 @@ class PayloadWatch:
         if self._planned is None or self._planned[0] is not window:
             self._planned = window, self._tool_at(window.descent)
         now, _ = self._hand_at(self._guidance.reference[CHI])
-        sight.ahead = self._planned[1] - now + self._shift.value
+        sight.ahead = self._planned[1] - now + self.shift.value
 
     def _tool_at(self, time: float) -> np.ndarray:
         """Return the tool's place (3,) [m] on the path at `time` [s] of the scenario."""

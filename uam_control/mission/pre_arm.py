@@ -34,49 +34,11 @@ class ChecklistReport:
     commands: bool = False
 
 
-class Permission:
-    """Permission to start; where it is not required, it is always there."""
-
-    NAME = "checklist"
-
-    def __init__(self, required: bool) -> None:
-        self._required = required
-        self._report: ChecklistReport | None = None
-
-    def take(self, report: ChecklistReport | None) -> None:
-        """Take a report; None forgets the last one."""
-        self._report = report
-
-    def lines(self, now: float) -> tuple[PreflightCheck, ...]:
-        """Return its line of the pre-arm report at `now` [s], () where it is not required."""
-        if not self._required:
-            return ()
-        value, report = "passed", self._report
-        if report is None:
-            value = "no report"
-        elif self._old(now):
-            value = f"silent for {now - report.stamp:.0f} s"
-        elif not report.passed:
-            value = report.failing or "not passed"
-        return (PreflightCheck(self.NAME, value, "all items passed", value == "passed"),)
-
-    def refusal(self, now: float) -> str:
-        """Return why there is no permission at `now` [s], in one line; "" if there is."""
-        return "".join(line.text for line in self.lines(now) if not line.passed)
-
-    def commands(self, now: float) -> bool:
-        """Return whether body rates are to be computed for a vehicle in the hands of a person."""
-        report = self._report
-        return self._required and report is not None and report.commands and not self._old(now)
-
-    def _old(self, now: float) -> bool:
-        return abs(now - self._report.stamp) > OLDEST
-
-
 class PreArm:
     """The report of one scenario.
 
-    `permission`: of the checklist; `stands` [s]: delay of the setpoints that the reference stands.
+    `checklist`: its newest report, None without; `stands` [s]: delay of the setpoints that the
+    reference stands.
     """
 
     def __init__(
@@ -89,7 +51,8 @@ class PreArm:
         """require_checklist: no flight without its permission; vehicle: with whose limits the
         reference is compared, None: it is not compared; compared: from the origin, it was before.
         """
-        self.permission = Permission(require_checklist)
+        self.checklist: ChecklistReport | None = None
+        self._required = require_checklist
         self._scenario, self._vehicle, self._compared = scenario, vehicle, compared
         self._stands: np.ndarray | None = None  # (4,) place and yaw of the line below
         self._place: tuple[PreflightCheck, ...] = ()
@@ -118,7 +81,32 @@ class PreArm:
         arm = self._scenario.arm_start
         lines = preflight(checks, seen, arm, p.start_speed, p.start_arm_error)
         self._look_at_place(seen.state[CHI], p)
-        return lines + self._reference + self._place + self.permission.lines(stamp)
+        return lines + self._reference + self._place + self._permission(stamp)
+
+    def _permission(self, now: float) -> tuple[PreflightCheck, ...]:
+        """Return the checklist's line at `now` [s], () where it is not required."""
+        if not self._required:
+            return ()
+        value, report = "passed", self.checklist
+        if report is None:
+            value = "no report"
+        elif self._old(now):
+            value = f"silent for {now - report.stamp:.0f} s"
+        elif not report.passed:
+            value = report.failing or "not passed"
+        return (PreflightCheck("checklist", value, "all items passed", value == "passed"),)
+
+    def refusal(self, now: float) -> str:
+        """Return why there is no permission at `now` [s], in one line; "" if there is."""
+        return "".join(line.text for line in self._permission(now) if not line.passed)
+
+    def hand_check(self, now: float) -> bool:
+        """Return whether body rates are to be computed for a vehicle in the hands of a person."""
+        report = self.checklist
+        return self._required and report is not None and report.commands and not self._old(now)
+
+    def _old(self, now: float) -> bool:
+        return abs(now - self.checklist.stamp) > OLDEST
 
     def _look_at_place(self, chi: np.ndarray, parameters: MissionParameters) -> None:
         """Compare the first moves from where the vehicle stands, chi (6 + n,), with the limits.

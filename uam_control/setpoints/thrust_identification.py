@@ -33,7 +33,7 @@ import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.laws.law_parameters import structured
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import Bound, ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
@@ -151,10 +151,12 @@ def identify(
     record: np.ndarray,
     memory: np.ndarray,
 ) -> float:
-    """Advance the identification by one tick and return the factor.
+    """Advance the identification by one tick and return the factor, always within its bounds.
 
-    time, state, command, assumed, flying: see `ThrustIdentification.update`; record: numbers of the
-    parameters, `numbers`; memory: state, `new_memory`; both structured arrays (1,).
+    time [s]; state (3, 6 + n): see uam_control.coordinates; command: normalised thrust sent at this
+    tick; assumed [N]: its collective by the curve, without the factor; flying: armed and
+    controlled; record: numbers of the parameters, `numbers`; memory: state, `new_memory`; both
+    structured arrays (1,).
     """
     p, m = record[0], memory[0]
     if not math.isfinite(time + assumed + command):
@@ -269,9 +271,6 @@ class ThrustIdentification:
         first = (parameters or ThrustIdentificationParameters.of(vehicle)).validated()
         self.record = numbers(first, self._gravity)
         self.configure(first)
-        self._identify = prepared(
-            identify, 0.0, np.zeros((3, 3)), 0.0, 0.0, True, self.record, self.memory
-        )
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
@@ -279,11 +278,6 @@ class ThrustIdentification:
         self.record[:] = numbers(p, self._gravity)
         memory = self.memory[0]
         memory.factor = min(p.factor_max, max(p.factor_min, memory.factor))
-
-    @property
-    def factor(self) -> float:
-        """True / assumed thrust, always within its bounds."""
-        return float(self.memory[0].factor)
 
     @property
     def magnet_waits(self) -> bool:
@@ -297,20 +291,8 @@ class ThrustIdentification:
         if self._switches and time < self._switches[-1][0]:  # the clock was restarted
             self._switches.clear()
         self._switches.append((time, bool(on)))
-        while len(self._switches) > 100:  # without calls of `update`: keep the latest
+        while len(self._switches) > 100:  # without ticks: keep the latest
             self._switches.popleft()
-
-    def update(
-        self, time: float, state: np.ndarray, command: float, assumed: float, flying: bool
-    ) -> float:
-        """Advance by one tick and return `factor`.
-
-        time [s]; state (3, 6 + n): see uam_control.coordinates; command: normalised thrust sent at
-        this tick; assumed [N]: its collective by the curve, without the factor; flying: armed and
-        controlled.
-        """
-        self.follow_magnet(time, math.isfinite(time + assumed + command))
-        return self._identify(time, state, command, assumed, flying, self.record, self.memory)
 
     def follow_magnet(self, time: float, usable: bool = True) -> None:
         """Take the magnet's states that count at the tick `time` [s], before `identify`.
