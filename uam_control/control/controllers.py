@@ -42,7 +42,6 @@ from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
-from uam_control.maths.compiled import prepared
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Flag, record
 from uam_control.settings.parameter_set import ParameterError
@@ -209,14 +208,13 @@ class AttitudeController(Controller):
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
         self.prediction = record("counts", PREDICTION)
         self.prediction["measured"] = math.nan
-        self._predict = prepared(predict_by, self.prediction, 0.0)
         super().__init__(parameters)
 
     def _arrays(self, of_all: ControllerArrays) -> AttitudeArrays:
         p, now = self.parameters, self.prediction
         now["counts"], now["nominal"] = p.prediction_measured, p.prediction_nominal
         now["prediction"] = p.prediction
-        self.measured(now["measured"].item())
+        predict_by(now, now["measured"].item())
         arrays = AttitudeArrays(
             *(of_all, p.load(), np.zeros(3), np.array(p.inertia, dtype=float)),
             *(np.array(p.feedforward_washout, dtype=float), self._slow),
@@ -227,10 +225,6 @@ class AttitudeController(Controller):
         self._begin = bound(begin_attitude, arrays, rows, rows, np.zeros((3, 3)), 0.0)
         self._end = bound(end_attitude, arrays)
         return arrays
-
-    def measured(self, loop_delay: float) -> None:
-        """See `predict_by`."""
-        self._predict(self.prediction, loop_delay)
 
     def update(
         self,

@@ -158,7 +158,6 @@ class HandTwist(Goal):
 
     @property
     def still(self) -> bool:
-        """See `Goal`."""
         return not (self.linear.any() or self.angular.any())
 
     def equals(self, other: HandTwist) -> bool:

@@ -9,7 +9,6 @@ from uam_control.coordinates import CHI, Z
 from uam_control.maths.compiled import borrowing
 from uam_control.mission.following import GuidanceArrays, follow_path
 from uam_control.mission.ground import on_ground
-from uam_control.mission.payload_watch import due
 from uam_control.supervision.checks import CheckArrays, measure_all
 from uam_control.supervision.observation import NUMBERS, ReadingArrays
 from uam_control.supervision.supervisor import stays_behind
@@ -56,9 +55,3 @@ def follow_scenario(
     s.stamp = stamp
     follow_path(path)
     return True
-
-
-@borrowing
-def watch_due(a: MissionArrays) -> bool:
-    """Return whether the executive of the grasps is due after `follow_scenario`."""
-    return due(a.watch, a.numbers[0].stamp, a.guidance.numbers[0].scenario_time)

@@ -214,7 +214,6 @@ class GoalPose(Goal):
 
     @property
     def columns(self) -> slice:
-        """See `Goal`."""
         return BASE if self.arm is None else BOTH
 
     def equals(self, other: GoalPose) -> bool:

@@ -21,7 +21,7 @@ from uam_control.maths.compiled import borrowing, counts_references
 from uam_control.maths.memory import put
 from uam_control.mission import Mission, Scenario, StartParameters
 from uam_control.mission.mission_output import HAND_CHECK
-from uam_control.mission.nominal_tick import watch_due
+from uam_control.mission.payload_watch import due
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
 from uam_control.stages.autopilot_port import AutopilotReport
@@ -375,7 +375,9 @@ def look_ahead_step(a: tuple) -> int:
     s, inputs, mission = a
     if not mission_stage.advance(mission, inputs.inputs.known, s.numbers[0].stamp, s.state):
         return DECIDE
-    return ASK if watch_due(mission.mission) else DONE
+    flown = mission.mission
+    time = flown.guidance.numbers[0].scenario_time
+    return ASK if due(flown.watch, flown.numbers[0].stamp, time) else DONE
 
 
 def _step(function: Callable, arrays: Callable[[ControlTick], tuple]) -> Callable:
@@ -426,17 +428,16 @@ def _estimate_step(tick: ControlTick) -> Step | None:
     return Step(estimate_step, (tick.arrays, tick.estimator.arrays, tick.biases))
 
 
+def _ahead(tick: ControlTick) -> tuple:
+    return tick.mission.inputs.arrays, tick.mission.arrays
+
+
 def _flown(tick: ControlTick) -> tuple:
-    mission = tick.mission
-    return tick.estimator.memory, tick.biases, mission.inputs.arrays, mission.arrays
+    return tick.estimator.memory, tick.biases, *_ahead(tick)
 
 
 def _steered(tick: ControlTick) -> tuple:
     return tick.hand.arrays, tick.arm.controller.memory
-
-
-def _ahead(tick: ControlTick) -> tuple:
-    return tick.mission.inputs.arrays, tick.mission.arrays
 
 
 SENSING = (
