@@ -12,7 +12,14 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap, generators, quantised, take_pose
+from uam_sim_bridge.plant.sensors import (
+    Delay,
+    Mocap,
+    encoder_units,
+    generators,
+    quantised,
+    take_pose,
+)
 
 VEHICLE = Vehicle.load()
 NUMBERS = VEHICLE.numbers
@@ -60,7 +67,7 @@ def test_servo_stays_within_the_torque_speed_line(effort, speed):
 
 @given(st.floats(-2, 2), st.floats(-5, 5))
 def test_encoder_reads_whole_counts(angle, velocity):
-    units = Encoders(NUMBERS["sensors"]["joints"]).units
+    units = encoder_units(NUMBERS["sensors"]["joints"])
     alpha, alpha_dot = np.zeros(1), np.zeros(1)
     quantised(np.array([angle]), np.array([velocity]), units, alpha, alpha_dot)
     count = 2 * np.pi / 4096

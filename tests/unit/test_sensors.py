@@ -11,11 +11,11 @@ from uam_sim_bridge.plant.sensors import (
     PAYLOAD_POSE,
     VEHICLE_POSE,
     Delay,
-    Encoders,
     Imu,
     Mocap,
     Noise,
     disturbed,
+    encoder_units,
     generators,
     quantised,
     receive_poses,
@@ -137,10 +137,10 @@ def test_a_delay_hands_out_one_sample_when_it_is_due():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_encoders_count(sign):
-    encoders = Encoders({"counts_per_turn": 8, "velocity_unit": 0.25})
+    units = encoder_units({"counts_per_turn": 8, "velocity_unit": 0.25})
     angles, velocities = sign * np.array([1.0, 2.0, 0.3]), sign * np.array([0.6, 0.1, 1.15])
     angle, velocity = np.zeros((2, 3))
-    quantised(angles, velocities, encoders.units, angle, velocity)
+    quantised(angles, velocities, units, angle, velocity)
     # an eighth of a turn is .785: 1.27, 2.55 and .38 of them are 1, 3 and 0
     np.testing.assert_allclose(angle, sign * math.pi / 4.0 * np.array([1.0, 3.0, 0.0]))
     np.testing.assert_allclose(velocity, sign * np.array([0.5, 0.0, 1.25]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +16,21 @@ PWM_FULL = 885.0  # PWM units of the whole supply voltage
 COUNTS_PER_TURN = 4096
 
 
-class Rotors:
-    """The rotors: motor command 0..1 → speed with lag → thrust.
+class RotorArrays(NamedTuple):
+    """constants (5,): thrust coefficient, full thrust [N], then a, b, c of T / full thrust = a +
+    b u + c u^2; gains (2, rotors): share of the difference per step while speeding up and slowing
+    down; efficiency (rotors,): factor on thrust; their state: speed (rotors,) [rad/s], thrust
+    (rotors,) [N]."""
 
-    `speed` (rotors,) [rad/s], `thrust` (rotors,) [N].
-    """
+    constants: np.ndarray
+    gains: np.ndarray
+    efficiency: np.ndarray
+    speed: np.ndarray
+    thrust: np.ndarray
+
+
+class Rotors:
+    """The rotors: motor command 0..1 → speed with lag → thrust; their arrays: see `RotorArrays`."""
 
     def __init__(self, numbers: dict, step: float) -> None:
         """numbers: the `rotors` entry of the vehicle; step: physics step [s]."""
@@ -31,8 +42,9 @@ class Rotors:
         self._lags, self._step = np.repeat(lags, len(self.efficiency), axis=1), step
         self.gains = np.empty_like(self._lags)
         self.scale_lags(np.ones(len(self.efficiency)))
-        self.speed = np.zeros(len(self.efficiency))
-        self.thrust = np.zeros(len(self.efficiency))
+        self.speed, self.thrust = np.zeros((2, len(self.efficiency)))
+        given = self.constants, self.gains, self.efficiency
+        self.arrays = RotorArrays(*given, self.speed, self.thrust)
 
     def scale_lags(self, factors: np.ndarray) -> None:
         """Multiply the time constants up and down (2, rotors) by factors of a shape like it."""
@@ -44,38 +56,37 @@ class Rotors:
         self.constants[2:] = idle**2, 2.0 * idle * (1.0 - idle), (1.0 - idle) ** 2
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
-        """Advance one physics step with commands (rotors,) 0..1; write thrust [N] to output
-        (rotors,)."""
-        rotor_step(
-            commands, self.constants, self.gains, self.efficiency, self.speed, self.thrust, output
-        )
+        """See `rotor_step`."""
+        rotor_step(commands, self.arrays, output)
 
 
 @borrowing
-def rotor_step(
-    commands: np.ndarray,
-    constants: np.ndarray,
-    gains: np.ndarray,
-    efficiency: np.ndarray,
-    speed: np.ndarray,
-    thrust: np.ndarray,
-    output: np.ndarray,
-) -> None:
+def rotor_step(commands: np.ndarray, a: RotorArrays, output: np.ndarray) -> None:
     """Advance rotors by one step: first-order speed lag, different up and down; T = c speed^2.
 
-    commands u (rotors,) 0..1; constants (5,): thrust coefficient, full thrust [N], then a, b, c of
-    T / full thrust = a + b u + c u^2; gains (2, rotors): share of the difference per step while
-    speeding up and slowing down; efficiency (rotors,): factor on thrust; speed (rotors,) [rad/s],
-    thrust and output (rotors,) [N] are overwritten.
+    commands u (rotors,) 0..1; output (rotors,) [N]: gets the thrust, too.
     """
-    coefficient, thrust_max, a, b, c = constants
+    coefficient, thrust_max, p, q, r = a.constants
     for i in range(len(commands)):
         u = min(max(commands[i], 0.0), 1.0)
-        desired = math.sqrt(thrust_max * (c * u * u + b * u + a) / coefficient)
-        gain = gains[0, i] if desired > speed[i] else gains[1, i]
-        speed[i] += gain * (desired - speed[i])
-        thrust[i] = efficiency[i] * coefficient * speed[i] * speed[i]
-        output[i] = thrust[i]
+        desired = math.sqrt(thrust_max * (r * u * u + q * u + p) / coefficient)
+        gain = a.gains[0, i] if desired > a.speed[i] else a.gains[1, i]
+        a.speed[i] += gain * (desired - a.speed[i])
+        a.thrust[i] = a.efficiency[i] * coefficient * a.speed[i] * a.speed[i]
+        output[i] = a.thrust[i]
+
+
+class ServoArrays(NamedTuple):
+    """command (n,): see `Servos`; constants (3, n): stall torque [N m], no-load speed [rad/s],
+    torque of one current unit [N m]; loop (4,): duty per count of position error, largest duty,
+    count [rad], whether the servos are in position control; torque (n,) [N m]; waiting (latency,
+    n): commands on their way, exchanged in turns, one at each control tick."""
+
+    command: np.ndarray
+    constants: np.ndarray
+    loop: np.ndarray
+    torque: np.ndarray
+    waiting: np.ndarray
 
 
 class Servos:
@@ -90,7 +101,7 @@ class Servos:
         """numbers: the `servos` entry of the vehicle; start (n,): initial joint angles [rad]."""
         self.in_position_mode = numbers["mode"] == POSITION_SERVO
         self.command = np.array(start if self.in_position_mode else np.zeros(len(start)))
-        self.loop = np.array(
+        loop = np.array(
             [
                 numbers["position_p_gain"] / P_GAIN_SCALE / PWM_FULL,
                 numbers["pwm_limit"] / PWM_FULL,
@@ -99,67 +110,49 @@ class Servos:
             ]
         )
         unit = np.multiply(numbers["torque_per_current"], numbers["current_unit"])
-        constants = numbers["stall_torque"], numbers["no_load_speed"], unit
-        self.constants = np.array([one + np.zeros(len(start)) for one in map(np.array, constants)])
+        given = numbers["stall_torque"], numbers["no_load_speed"], unit
+        constants = np.array([one + np.zeros(len(start)) for one in map(np.array, given)])
         self.torque = np.zeros(len(start))
-        self.waiting = np.full((numbers["command_latency_ticks"], len(start)), np.nan)
+        waiting = np.full((numbers["command_latency_ticks"], len(start)), np.nan)
+        self.arrays = ServoArrays(self.command, constants, loop, self.torque, waiting)
 
     def take(self, command: np.ndarray, tick: int = 0) -> None:
         """Send `command` (n,) at the control tick `tick`; see `receive`."""
-        receive(command, tick, self.waiting, self.command)
+        receive(command, tick, self.arrays)
 
     def step(self, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
-        """Write the torque (n,) [N m] at angle (n,) [rad] and velocity (n,) [rad/s] to output."""
-        joint_step(self.command, angle, velocity, self.constants, self.loop, self.torque, output)
+        """See `joint_step`."""
+        joint_step(self.arrays, angle, velocity, output)
 
 
 @borrowing
-def receive(sent: np.ndarray, tick: int, waiting: np.ndarray, held: np.ndarray) -> None:
-    """Send a command on the bus; the one that arrives at this tick is written to `held` (n,).
+def receive(sent: np.ndarray, tick: int, a: ServoArrays) -> None:
+    """Send a command on the bus; the one that arrives at this tick is held from now on.
 
-    sent (n,): NaN for no command, as at the begin: `held` stays; waiting (latency, n): those on
-    their way, exchanged in turns, one at each control tick.
+    sent (n,): NaN for no command, as at the begin: the held one stays.
     """
-    latency = len(waiting)
-    for i in range(len(held)):
+    latency = len(a.waiting)
+    for i in range(len(a.command)):
         value = sent[i]
         if latency:
-            value, waiting[tick % latency, i] = waiting[tick % latency, i], value
+            value, a.waiting[tick % latency, i] = a.waiting[tick % latency, i], value
         if math.isfinite(value):
-            held[i] = value
+            a.command[i] = value
 
 
 @borrowing
-def joint_step(
-    command: np.ndarray,
-    angle: np.ndarray,
-    velocity: np.ndarray,
-    constants: np.ndarray,
-    loop: np.ndarray,
-    torque: np.ndarray,
-    output: np.ndarray,
-) -> None:
-    """Write torque and output (n,) [N m] in the mode of the servos.
-
-    command (n,): see `Servos`; angle (n,) [rad]; velocity (n,) [rad/s]; constants: see
-    `servo_step`; loop (4,): duty per count of position error, largest duty, count [rad], whether
-    the servos are in position control.
-    """
-    if loop[3] > 0.0:
-        position_step(command, angle, velocity, constants, loop, torque, output)
+def joint_step(a: ServoArrays, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
+    """Write torque and output (n,) [N m] in the mode of the servos; angle (n,) [rad], velocity
+    (n,) [rad/s]."""
+    if a.loop[3] > 0.0:
+        position_step(a, angle, velocity, output)
     else:
-        servo_step(command, velocity, constants, torque, output)
+        servo_step(a, velocity, output)
 
 
 @borrowing
 def position_step(
-    goal: np.ndarray,
-    angle: np.ndarray,
-    velocity: np.ndarray,
-    constants: np.ndarray,
-    loop: np.ndarray,
-    torque: np.ndarray,
-    output: np.ndarray,
+    a: ServoArrays, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray
 ) -> None:
     """Write torque and output (n,) [N m] of the position loop; arguments as in `joint_step`.
 
@@ -167,33 +160,25 @@ def position_step(
     speed), the line of a DC motor at the voltage of the duty. Source: ROBOTIS e-manual, XM430-W210,
     Position PID Gain. The maker's I and D gains are 0.
     """
-    gain, limit, count = loop[0], loop[1], loop[2]
-    for i in range(len(goal)):
-        stall, no_load = constants[0, i], constants[1, i]
-        error = np.round(goal[i] / count) - np.round(angle[i] / count)
+    gain, limit, count = a.loop[0], a.loop[1], a.loop[2]
+    for i in range(len(a.command)):
+        stall, no_load = a.constants[0, i], a.constants[1, i]
+        error = np.round(a.command[i] / count) - np.round(angle[i] / count)
         duty = min(limit, max(-limit, gain * error))
-        torque[i] = min(stall, max(-stall, stall * (duty - velocity[i] / no_load)))
-        output[i] = torque[i]
+        a.torque[i] = min(stall, max(-stall, stall * (duty - velocity[i] / no_load)))
+        output[i] = a.torque[i]
 
 
 @borrowing
-def servo_step(
-    effort: np.ndarray,
-    velocity: np.ndarray,
-    constants: np.ndarray,
-    torque: np.ndarray,
-    output: np.ndarray,
-) -> None:
+def servo_step(a: ServoArrays, velocity: np.ndarray, output: np.ndarray) -> None:
     """Write torque and output (n,) [N m]: effort in whole current units, within the speed limit.
 
-    effort (n,) [N m]; velocity (n,) [rad/s]; constants (3, n): stall torque [N m], no-load
-    speed [rad/s], torque of one current unit [N m]. Limit: stall torque (1 - speed / no-load
-    speed).
+    velocity (n,) [rad/s]. Limit: stall torque (1 - speed / no-load speed).
     """
-    for i in range(len(effort)):
-        stall, no_load, unit = constants[0, i], constants[1, i], constants[2, i]
-        desired = unit * np.round(effort[i] / unit)
+    for i in range(len(a.command)):
+        stall, no_load, unit = a.constants[0, i], a.constants[1, i], a.constants[2, i]
+        desired = unit * np.round(a.command[i] / unit)
         forward = max(0.0, min(1.0, 1.0 - velocity[i] / no_load)) * stall
         backward = max(0.0, min(1.0, 1.0 + velocity[i] / no_load)) * stall
-        torque[i] = min(max(desired, -backward), forward)
-        output[i] = torque[i]
+        a.torque[i] = min(max(desired, -backward), forward)
+        output[i] = a.torque[i]

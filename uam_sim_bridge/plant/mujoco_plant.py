@@ -30,10 +30,10 @@ from uam_sim_bridge.plant.sensors import (
     BLOCK,
     PAYLOAD_POSE,
     VEHICLE_POSE,
-    Encoders,
     Imu,
     Mocap,
     Noise,
+    encoder_units,
     generators,
 )
 from uam_sim_bridge.plant.vehicle import BASE, FACE, MAGNET, PAYLOAD, SWING, Vehicle
@@ -74,7 +74,7 @@ class MujocoPlant(Plant):
         self._imu = Imu(sensors["imu"], scale, imu_noise)
         noises = mocap_noise, payload_noise
         self._mocap = Mocap(sensors["mocap"], scale, noises, self._payload_top)
-        self._encoders = Encoders(sensors["joints"])
+        self._encoder_units = encoder_units(sensors["joints"])
 
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
         self.servos = Servos(numbers["servos"], self._alpha)
@@ -156,21 +156,12 @@ class MujocoPlant(Plant):
         self._magnet_constants = magnet_constants(self.model, magnet["gap_scale"], curve)
 
     def _physics_arrays(self) -> PhysicsArrays:
-        rotors, servos = self.rotors, self.servos
         return PhysicsArrays(
-            rotor_constants=rotors.constants,
-            rotor_gains=rotors.gains,
-            efficiency=rotors.efficiency,
-            speed=rotors.speed,
-            thrust=rotors.thrust,
+            rotors=self.rotors.arrays,
             thrust_control=self._thrust_control,
-            waiting_commands=servos.waiting,
-            servo_command=servos.command,
+            servos=self.servos.arrays,
             angles=self._alpha,
             joint_rates=self._alpha_dot,
-            servo_constants=servos.constants,
-            servo_loop=servos.loop,
-            torque=servos.torque,
             torque_control=self._torque_control,
             drag=self._drag,
             velocity=self._velocity,
@@ -204,7 +195,7 @@ class MujocoPlant(Plant):
             specific_force=self._specific_force,
             imu_bias=self._imu.bias,
             servo_torque=self.servos.torque,
-            encoder_units=self._encoders.units,
+            encoder_units=self._encoder_units,
             rotor_thrust=self.rotors.thrust,
             payload=self._payload_pose,
             magnet_control=self._magnet_control,
@@ -246,7 +237,7 @@ class MujocoPlant(Plant):
             period=self.period,
             arm=(self.model.joint(first).dofadr[0], self.joints),
             torque_control=self._torque_control,
-            encoder_units=self._encoders.units,
+            encoder_units=self._encoder_units,
             sample=np.empty(8 + 3 * self.joints),
             pose=self._mocap.arrays.taken[VEHICLE_POSE],
         )

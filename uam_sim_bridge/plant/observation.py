@@ -191,7 +191,7 @@ def step(a: PlantArrays, motors: np.ndarray, arm_command: np.ndarray, magnet: bo
     model, data, steps = int(m.model_at), int(m.data_at), m.steps
     gust = a.gusts.rows[next_row(a.gusts) if m.gusty else 0]
     begin_period(physics, arm_command, magnet, gust, m.tick)
-    affect(a.effects, physics.efficiency)
+    affect(a.effects, physics.rotors.efficiency)
     for _ in range(steps):
         actuate(physics, motors)
         call_all(a.effects.joints)

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
-from uam_sim_bridge.plant.actuators import joint_step, receive, rotor_step
+from uam_sim_bridge.plant.actuators import (
+    RotorArrays,
+    ServoArrays,
+    joint_step,
+    receive,
+    rotor_step,
+)
 from uam_sim_bridge.plant.gripper import move_fingers
 from uam_sim_bridge.plant.magnet import pull_fraction
 
@@ -15,27 +21,19 @@ from uam_sim_bridge.plant.magnet import pull_fraction
 class PhysicsArrays(NamedTuple):
     """What the physics reads and writes, as arrays that never move; most are MuJoCo's.
 
-    rotor_constants to thrust_control: see `rotor_step`; waiting_commands: see `receive`;
-    servo_command to torque_control: see `joint_step`. drag (3,) [N s/m]; velocity (3,) [m/s], force
-    (3,) [N] on the base, ENU; wind, wind_mean (3,) [m/s], gust_keep (1,): see `blow`.
+    thrust_control: see `rotor_step`; angles to torque_control: see `joint_step`. drag (3,)
+    [N s/m]; velocity (3,) [m/s], force (3,) [N] on the base, ENU; wind, wind_mean (3,) [m/s],
+    gust_keep (1,): see `blow`.
     face, payload, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1.
     finger_ends, finger_goal: see `move_fingers`.
     sensed_force (3,) [m/s^2, FLU]: specific force of a physics step, specific_force: the mean.
     """
 
-    rotor_constants: np.ndarray
-    rotor_gains: np.ndarray
-    efficiency: np.ndarray
-    speed: np.ndarray
-    thrust: np.ndarray
+    rotors: RotorArrays
     thrust_control: np.ndarray
-    waiting_commands: np.ndarray
-    servo_command: np.ndarray
+    servos: ServoArrays
     angles: np.ndarray
     joint_rates: np.ndarray
-    servo_constants: np.ndarray
-    servo_loop: np.ndarray
-    torque: np.ndarray
     torque_control: np.ndarray
     drag: np.ndarray
     velocity: np.ndarray
@@ -63,7 +61,7 @@ def begin_period(
     arm_command (n,): sent now, see `receive`; gust (3,): see `blow`. Sets the specific force to 0,
     for the mean over the physics steps.
     """
-    receive(arm_command, tick, a.waiting_commands, a.servo_command)
+    receive(arm_command, tick, a.servos)
     blow(a.wind, a.wind_mean, a.gust_keep[0], gust)
     for i in range(3):
         a.force[i] = a.drag[i] * (a.wind[i] - a.velocity[i])
@@ -76,24 +74,8 @@ def begin_period(
 @borrowing
 def actuate(a: PhysicsArrays, commands: np.ndarray) -> None:
     """Write thrusts and joint torques of the next physics step; commands (rotors,): 0..1."""
-    rotor_step(
-        commands,
-        a.rotor_constants,
-        a.rotor_gains,
-        a.efficiency,
-        a.speed,
-        a.thrust,
-        a.thrust_control,
-    )
-    joint_step(
-        a.servo_command,
-        a.angles,
-        a.joint_rates,
-        a.servo_constants,
-        a.servo_loop,
-        a.torque,
-        a.torque_control,
-    )
+    rotor_step(commands, a.rotors, a.thrust_control)
+    joint_step(a.servos, a.angles, a.joint_rates, a.torque_control)
 
 
 @borrowing

@@ -255,12 +255,12 @@ def receive_poses(a: MocapArrays, tick: int) -> None:
             a.count[body] -= 1
 
 
-class Encoders:
-    """Dynamixel position and velocity with their quantisation: `units` (2,) of `quantised`."""
+def encoder_units(numbers: dict) -> np.ndarray:
+    """Return the steps (2,) of a Dynamixel's position [rad] and velocity [rad/s].
 
-    def __init__(self, numbers: dict) -> None:
-        """numbers: `sensors.joints` of the vehicle."""
-        self.units = np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
+    numbers: `sensors.joints` of the vehicle.
+    """
+    return np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
 
 
 @borrowing
