@@ -1,5 +1,7 @@
 """Time limits of a flight, for both engines."""
 
+import math
+
 from uam_control.mission import MissionParameters, Scenario
 
 STILL_ARMED = 15.0  # s of simulation time for the autopilot's landing after the mission's end
@@ -41,3 +43,28 @@ class Settled:
         elif self._flown and self._disarmed is None:
             self._disarmed = time
         return self._disarmed is not None and time - self._disarmed >= SETTLED
+
+
+class FlightEnd(Settled):
+    """Tells why a flight of a node is over, `linger` [s] after its mission."""
+
+    def __init__(self, linger: float) -> None:
+        super().__init__()
+        self._linger, self._end = linger, math.inf
+
+    def reason(
+        self, time: float, armed: bool, done: bool, limit: tuple[float, str] = (math.inf, "")
+    ) -> str:
+        """Return why it is over at `time` [s], "" while it is not; done: the mission is.
+
+        limit: latest end [s], and what to call it.
+        """
+        if done and self.after_mission(time, armed) and math.isinf(self._end):
+            self._end = time + self._linger
+        disarmed = self.over(time, armed)
+        latest, text = limit
+        if self._end < math.inf:
+            return "mission" if time >= min(self._end, latest) else ""
+        if disarmed:
+            return DISARMED
+        return text if time >= latest else ""

@@ -119,6 +119,11 @@ class Timeline:
         return max(0.0, self._takeoff + min(times) - TOLERANCE - stamp)
 
     @property
+    def active(self) -> list[Any]:
+        """Return the faults that have begun and not ended, in the order of the schedule."""
+        return [one.fault for one in self.all if one.active]
+
+    @property
     def records(self) -> list[dict[str, Any]]:
         """Return the records of all faults that have begun, in the order of the schedule."""
         return [one.record for one in self.all if one.begin is not None]

@@ -54,7 +54,8 @@ class Laboratory:
 
     `bus`, `cable`, `mocap`, `hil`: the devices; `grip`: the person's hands; `folded` (n,): the
     arm at the start [rad], as which hands hold it until the servos are first driven.
-    Cables are pulled by `cables.Cables`.
+    Cables are pulled by `cables.Cables`. `imu_plugged`: whether the companion's own IMU is there;
+    `poses_come`: whether another's driver of the motion capture has poses.
     """
 
     def __init__(
@@ -112,7 +113,7 @@ class Laboratory:
             self.hil: HilServer | HilLine = HilLine(p.places / USB, rotors, p.seed)
         else:
             self.hil = HilServer(p.hil_port, rotors, seed=p.seed)
-        self.hil_plugged = self.magnet_plugged = True
+        self.hil_plugged = self.magnet_plugged = self.imu_plugged = self.poses_come = True
         self.magnet = False
         self.mocap.start()
 

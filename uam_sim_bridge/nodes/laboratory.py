@@ -20,7 +20,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import CHI
-from uam_control.mission.time_limit import DISARMED, Settled
+from uam_control.mission.time_limit import FlightEnd
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
@@ -161,8 +161,9 @@ class Rehearsal:
         gc.freeze()
         numbers.fifo_priority = hardware_priority.prefer()
         clock.begin()
-        begin, end, settled = time.monotonic(), math.inf, Settled()
+        begin, end = time.monotonic(), FlightEnd(self._p.linger)
         limit, latest = self._p.flight_limit or math.inf, math.inf
+        text = f"time limit of {limit:g} s after arming"
         while not self._stop.raised and not numbers.ended_by:
             clock.note(lab.plant.tick)
             host = clock.host(lab.plant.tick)
@@ -170,15 +171,8 @@ class Rehearsal:
             now = lab.plant.time
             if lab.hil.armed and not numbers.armed:
                 numbers.armed, latest = True, now + limit
-            done = self._mission.done and math.isinf(end)
-            if done and settled.after_mission(now, lab.hil.armed):
-                end = now + self._p.linger
-            if now >= end:
-                numbers.ended_by = "mission"
-            elif settled.over(now, lab.hil.armed):
-                numbers.ended_by = DISARMED
-            elif now >= latest:
-                numbers.ended_by = f"time limit of {limit:g} s after arming"
+            armed, done = lab.hil.armed, self._mission.done
+            numbers.ended_by = end.reason(now, armed, done, (latest, text))
         numbers.ended_by = numbers.ended_by or "interrupt"
         numbers.wall_s = time.monotonic() - begin
 
@@ -193,9 +187,9 @@ class Rehearsal:
         lab.send_hil(samples, truth)
         tick, shift = lab.plant.tick, host - lab.plant.time
         if self._imu is not None:
-            self._imu.publish(tick, samples.hil, shift, self._cables.imu_plugged)
+            self._imu.publish(tick, samples.hil, shift, lab.imu_plugged)
         if self._poses is not None:
-            self._poses.publish(tick, samples.mocap, shift, self._cables.poses_come)
+            self._poses.publish(tick, samples.mocap, shift, lab.poses_come)
         if tick % LISTEN_TICKS:
             self._truth.publish_state(stamp, truth)
         else:

@@ -31,7 +31,7 @@ from pathlib import Path
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import POSITION
-from uam_control.mission.time_limit import DISARMED, Settled
+from uam_control.mission.time_limit import FlightEnd
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
@@ -232,10 +232,11 @@ class Simulator:
     def run(self) -> None:
         """Run ticks until the mission is done, the time limit, or SIGINT."""
         realtime = self.options.clock == "realtime"
-        limit, end = self.options.time_limit or math.inf, math.inf
+        limit = self.options.time_limit or math.inf
+        at_limit = limit, f"time limit of {limit:g} s"
         gc.collect()
         gc.freeze()  # existing objects stay: later collections skip them
-        begin, settled = time.monotonic(), Settled()
+        begin, end = time.monotonic(), FlightEnd(self.options.linger)
         self._clock.begin()
         while not self._stop.raised:
             begun = time.perf_counter()
@@ -266,22 +267,10 @@ class Simulator:
                 self.statistics.ended_by = str(error)
                 break
             self.health.done_tick(begun, self.plant.time)
-            if not self.options.end_with_mission:
-                if self.plant.time >= limit:
-                    self.statistics.ended_by = f"time limit of {limit:g} s"
-                    break
-                continue
-            done = self.answers.mission.done
-            if done and settled.after_mission(self.plant.time, self.hil.armed) and math.isinf(end):
-                self.statistics.ended_by = "mission"
-                end = self.plant.time + self.options.linger
-            if self.plant.time >= end:
-                break
-            if settled.over(self.plant.time, self.hil.armed) and not self.statistics.ended_by:
-                self.statistics.ended_by = DISARMED
-                break
-            if self.plant.time >= limit:
-                self.statistics.ended_by = self.statistics.ended_by or f"time limit of {limit:g} s"
+            ends = self.options.end_with_mission  # else by its limit alone
+            armed, done = ends and self.hil.armed, ends and self.answers.mission.done
+            self.statistics.ended_by = end.reason(self.plant.time, armed, done, at_limit)
+            if self.statistics.ended_by:
                 break
         else:
             self.statistics.ended_by = "interrupt"
