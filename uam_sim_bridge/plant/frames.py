@@ -11,8 +11,9 @@ from uam_control.maths.rotations import (
     quaternion_multiply,
 )
 from uam_control.vehicle.chain_reader import hand_site
-from uam_sim_bridge.plant.urdf import BASE_LINK, carried
 from uam_sim_bridge.plant.vehicle import BASE
+
+BASE_LINK = "base_link"  # REP-105's name of the base
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,16 @@ class Box:
 
     centre: np.ndarray
     edges: np.ndarray
+
+
+def carried(model: mujoco.MjModel) -> list[int]:
+    """Return the bodies carried by the vehicle's base, parents first, without massless ones."""
+    root = model.body(BASE).id
+    return [
+        body
+        for body in range(root + 1, model.nbody)
+        if model.body_rootid[body] == root and model.body_mass[body] > 0.0
+    ]
 
 
 def frames(model: mujoco.MjModel) -> list[Frame]:

@@ -5,10 +5,11 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
+from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.vehicle import Servo
+from uam_sim_bridge.plant.frames import BASE_LINK, Frame, carried, frames
 from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
-BASE_LINK = "base_link"  # REP-105's name of the base
 PASSIVE = Servo(0.0, 0.0, 0.0)  # of a hinge without one
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
@@ -27,39 +28,25 @@ SHAPES = {
 
 def urdf(vehicle: Vehicle) -> str:
     """Return the URDF text: base and arm, inertia and visuals; frames as in the MJCF (FLU)."""
-    model = vehicle.compile(0.0)
+    model, described = vehicle.compile(0.0), vehicle.description
     robot = ElementTree.Element("robot", name=model.body(BASE).name)
-    root, described = model.body(BASE).id, vehicle.description
     servos = dict(zip(described.joint_names, described.servos, strict=True))
-    for body in (root, *carried(model)):
-        name = BASE_LINK if body == root else model.body(body).name
-        link = ElementTree.SubElement(robot, "link", name=name)
-        _inertial(link, model, body)
-        for geom in np.flatnonzero(model.geom_bodyid == body):
-            _visual(link, model, geom)
-        if body != root:
-            parent = model.body_parentid[body]
-            owner = BASE_LINK if parent == root else model.body(parent).name
-            _joint(robot, model, body, owner, servos)
+    _link(robot, model, model.body(BASE).id, BASE_LINK)
+    for body, frame in zip(carried(model), frames(model), strict=True):
+        _link(robot, model, body, frame.name)
+        _joint(robot, model, frame, servos.get(frame.joint, PASSIVE))
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def carried(model: mujoco.MjModel) -> list[int]:
-    """Return the bodies carried by the vehicle's base, parents first, without massless ones."""
-    root = model.body(BASE).id
-    return [
-        body
-        for body in range(root + 1, model.nbody)
-        if model.body_rootid[body] == root and model.body_mass[body] > 0.0
-    ]
-
-
-def _inertial(link: ElementTree.Element, model: mujoco.MjModel, body: int) -> None:
+def _link(robot: ElementTree.Element, model: mujoco.MjModel, body: int, name: str) -> None:
+    link = ElementTree.SubElement(robot, "link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(model.body_ipos[body]), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=_text(model.body_mass[body : body + 1]))
-    axes = _matrix(model.body_iquat[body])
+    axes = np.zeros(9)
+    mujoco.mju_quat2Mat(axes, model.body_iquat[body])
+    axes = axes.reshape(3, 3)
     tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
     ElementTree.SubElement(
         inertial,
@@ -71,6 +58,8 @@ def _inertial(link: ElementTree.Element, model: mujoco.MjModel, body: int) -> No
             if j >= i
         },
     )
+    for geom in np.flatnonzero(model.geom_bodyid == body):
+        _visual(link, model, geom)
 
 
 def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None:
@@ -78,12 +67,7 @@ def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None
     if shape is None:
         return
     visual = ElementTree.SubElement(link, "visual")
-    ElementTree.SubElement(
-        visual,
-        "origin",
-        xyz=_text(model.geom_pos[geom]),
-        rpy=_text(_euler(_matrix(model.geom_quat[geom]))),
-    )
+    _origin(visual, model.geom_pos[geom], model.geom_quat[geom])
     tag, attributes = shape(model.geom_size[geom])
     ElementTree.SubElement(ElementTree.SubElement(visual, "geometry"), tag, attributes)
     material = model.geom_matid[geom]
@@ -92,59 +76,31 @@ def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None
     ElementTree.SubElement(paint, "color", rgba=_text(colour))
 
 
-def _joint(
-    robot: ElementTree.Element,
-    model: mujoco.MjModel,
-    body: int,
-    parent: str,
-    servos: dict[str, Servo],
-) -> None:
-    hinge = model.body_jntnum[body] > 0
-    index = model.body_jntadr[body]
-    slides = hinge and model.jnt_type[index] == mujoco.mjtJoint.mjJNT_SLIDE
-    name = model.joint(index).name if hinge else f"{model.body(body).name}_mount"
-    limited = hinge and bool(model.jnt_limited[index])
-    kind = "fixed" if not hinge else "revolute" if limited else "continuous"
-    kind = "prismatic" if slides else kind
+def _joint(robot: ElementTree.Element, model: mujoco.MjModel, frame: Frame, servo: Servo) -> None:
+    hinge = model.joint(frame.joint) if frame.joint else None
+    limited = hinge is not None and bool(hinge.limited[0])
+    kind = "fixed" if hinge is None else "revolute" if limited else "continuous"
+    kind = "prismatic" if frame.slides else kind
+    name = frame.joint or f"{frame.name}_mount"
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
-    ElementTree.SubElement(
-        joint,
-        "origin",
-        xyz=_text(model.body_pos[body]),
-        rpy=_text(_euler(_matrix(model.body_quat[body]))),
-    )
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=model.body(body).name)
-    if hinge:
-        ElementTree.SubElement(joint, "axis", xyz=_text(model.jnt_axis[index]))
+    _origin(joint, frame.position, frame.quaternion)
+    ElementTree.SubElement(joint, "parent", link=frame.parent)
+    ElementTree.SubElement(joint, "child", link=frame.name)
+    if hinge is not None:
+        ElementTree.SubElement(joint, "axis", xyz=_text(frame.axis))
     if limited:
-        low, high = model.jnt_range[index]
-        servo = servos.get(name, PASSIVE)
-        ElementTree.SubElement(
-            joint,
-            "limit",
-            lower=_text([low]),
-            upper=_text([high]),
-            effort=_text([servo.stall_torque]),
-            velocity=_text([servo.no_load_speed]),
-        )
+        numbers = {
+            "lower": hinge.range[0],
+            "upper": hinge.range[1],
+            "effort": servo.stall_torque,
+            "velocity": servo.no_load_speed,
+        }
+        ElementTree.SubElement(joint, "limit", {key: _text([n]) for key, n in numbers.items()})
 
 
-def _matrix(quaternion: np.ndarray) -> np.ndarray:
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)
-
-
-def _euler(matrix: np.ndarray) -> np.ndarray:
-    """Return fixed-axis roll, pitch, yaw (3,) [rad], URDF's rpy, of a rotation matrix (3, 3)."""
-    return np.array(
-        [
-            np.arctan2(matrix[2, 1], matrix[2, 2]),
-            np.arcsin(np.clip(-matrix[2, 0], -1.0, 1.0)),
-            np.arctan2(matrix[1, 0], matrix[0, 0]),
-        ]
-    )
+def _origin(of: ElementTree.Element, position: np.ndarray, quaternion: np.ndarray) -> None:
+    turn = euler_from_quaternion(quaternion)  # URDF's rpy: about fixed axes
+    ElementTree.SubElement(of, "origin", xyz=_text(position), rpy=_text(turn))
 
 
 def _text(numbers: np.ndarray | list) -> str:
