@@ -87,18 +87,18 @@ def test_a_difference_is_reported_exactly_if_the_rule_is_not_met(value, name):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[1]", "sections"),
-        ("a: 3", "a: 'NAME"),
-        ("a: {X: 3}", "X: {rule, why"),
-        ("a: {X: {is: 3}}", "why"),
-        ("a: {X: {why: w}}", "no rule; rules are is, one_of"),
-        ("a: {X: {was: 1, why: w}}", "was; rules are"),
+        ("[1]", "a mapping expected"),
+        ("a: 3", "a: a mapping expected"),
+        ("a: {X: 3}", "a.X: a mapping expected"),
+        ("a: {X: {is: 3}}", "a.X.why is missing"),
+        ("a: {X: {why: w}}", "a.X: no rule; one of is, one_of"),
+        ("a: {X: {was: 1, why: w}}", "a.X.was: unknown"),
         ("a: {X: {is: 1, most: 2, why: w}}", "only least and most"),
-        ("a: {X: {is: high, why: w}}", "'high' is not a number"),
-        ("a: {X: {one_of: [], why: w}}", "one_of"),
-        ("a: {X: {bits: 0, why: w}}", "bits: 0"),
+        ("a: {X: {is: high, why: w}}", "a.X.is: a number expected, got 'high'"),
+        ("a: {X: {one_of: [], why: w}}", "one_of: a list of numbers expected"),
+        ("a: {X: {bits: 0, why: w}}", "bits: a whole number expected, 1, 2, .., got 0"),
         ("a: {X: {least: 2, most: 1, why: w}}", "least 2 is above most 1"),
-        ("a: {X: {is: 1, why: w}}\nb: {X: {is: 2, why: w}}", "X is there twice"),
+        ("a: {X: {is: 1, why: w}}\nb: {X: {is: 2, why: w}}", "b.X: is there twice"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(text, message, tmp_path):

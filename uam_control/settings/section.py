@@ -168,8 +168,8 @@ class Section:
         return value
 
     @_reader
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return the entry `key`, a list of `count` finite numbers."""
+    def numbers(self, key: str, count: int | None = None) -> tuple[float, ...]:
+        """Return the entry `key`, a list of `count` finite numbers; None: of one or more."""
         return self._listed(key, self.entry(key), count)
 
     def rows(self, key: str, count: int) -> tuple[tuple[float, ...], ...]:
@@ -179,9 +179,11 @@ class Section:
             raise self.error(key, f"a list of lists of numbers expected: {value!r}")
         return tuple(self._listed(f"{key}[{i}]", row, count) for i, row in enumerate(value))
 
-    def _listed(self, key: str, value: Any, count: int) -> tuple[float, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise self.error(key, f"a list of {count} numbers expected: {value!r}")
+    def _listed(self, key: str, value: Any, count: int | None) -> tuple[float, ...]:
+        length = len(value) if isinstance(value, list) else -1
+        if length < 1 if count is None else length != count:
+            numbers = "numbers" if count is None else f"{count} numbers"
+            raise self.error(key, f"a list of {numbers} expected: {value!r}")
         return tuple(self._checked(key, item) for item in value)
 
     def _checked(self, key: str, value: Any) -> float:

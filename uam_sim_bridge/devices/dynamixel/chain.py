@@ -185,7 +185,7 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     speed = arm.number("baud_rate")
     if speed not in SPEEDS:
         raise arm.error("baud_rate", f"{speed:.10g} is not one of {', '.join(map(str, SPEEDS))}")
-    delay = _whole(arm, "return_delay_us", 0, 508)
+    delay = arm.whole("return_delay_us", 0, 508)
     if delay % 2:
         raise arm.error("return_delay_us", f"{delay} is odd; the servos' unit is 2 us")
     servos = tuple(_servo(entries[name], i, vehicle) for i, name in enumerate(joints))
@@ -213,7 +213,7 @@ def _table(entry: Section) -> ControlTable:
 
 
 def _direction(entry: Section) -> int:
-    direction = _whole(entry, "direction", -1, 1)
+    direction = entry.whole("direction", -1, 1)
     if direction == 0:
         raise entry.error("direction", "0 is not one of 1, -1")
     return direction
@@ -229,10 +229,10 @@ def _gripper_servo(entry: Section, numbers: dict[str, Any]) -> ServoDescription:
     _check_unit(entry, table, unit)
     return ServoDescription(
         joint=GRIPPER,
-        id=_whole(entry, "id", 0, LAST_ID),
+        id=entry.whole("id", 0, LAST_ID),
         table=table,
         direction=_direction(entry),
-        zero=_whole(entry, "zero", -table.counts_per_turn, 2 * table.counts_per_turn),
+        zero=entry.whole("zero", -table.counts_per_turn, 2 * table.counts_per_turn),
         gear=1.0,
         torque_constant=constant,
         current_unit=unit,
@@ -269,16 +269,12 @@ def _servo(entry: Section, number: int, vehicle: VehicleDescription) -> ServoDes
             f"{gear:g} makes the joint's {math.degrees(high - low):g} deg {turns:.3g} turns of the "
             f"servo; less than one is possible: below {gear / turns:.3g}, or a narrower range_deg",
         )
-    friction = [entry.number(name) for name in ("coulomb", "viscous")]
-    for name, value in zip(("coulomb", "viscous"), friction, strict=True):
-        if value < 0.0:
-            raise entry.error(name, f"{value:g} is below 0")
     return ServoDescription(
         joint=joint.name,
-        id=_whole(entry, "id", 0, LAST_ID),
+        id=entry.whole("id", 0, LAST_ID),
         table=table,
         direction=direction,
-        zero=_whole(entry, "zero", -table.counts_per_turn, 2 * table.counts_per_turn),
+        zero=entry.whole("zero", -table.counts_per_turn, 2 * table.counts_per_turn),
         gear=gear,
         torque_constant=motor.positive("torque_per_current") * scale * gear,
         current_unit=unit,
@@ -286,8 +282,8 @@ def _servo(entry: Section, number: int, vehicle: VehicleDescription) -> ServoDes
         low=low,
         high=high,
         stowed=joint.stowed,
-        coulomb=friction[0],
-        viscous=friction[1],
+        coulomb=entry.not_negative("coulomb"),
+        viscous=entry.not_negative("viscous"),
         torque_scale=scale,
     )
 
@@ -301,10 +297,3 @@ def _check_unit(entry: Section, table: ControlTable, unit: float) -> None:
             f"{table.model} counts {1e3 * own:g} mA, current_unit is {1e3 * unit:g} mA: give "
             "current_unit [A] and torque_per_current [N m/A] of this servo",
         )
-
-
-def _whole(section: Section, key: str, low: int, high: int) -> int:
-    value = section.number(key)
-    if value != int(value) or not low <= value <= high:
-        raise section.error(key, f"{value:g} is not a whole number from {low} to {high}")
-    return int(value)

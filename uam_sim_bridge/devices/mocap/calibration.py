@@ -106,9 +106,7 @@ def load(name_or_file: str) -> Calibration:
     file = configuration.named(FOLDER, name_or_file)
     section = read_section(file, MocapError)
     section.only(sorted(ENTRIES))
-    up = section.text("up")
-    if up not in UPRIGHT:
-        raise section.error("up", f"'{up}' is not one of {', '.join(UPRIGHT)}")
+    up = section.one_of("up", UPRIGHT)
     body, pivot = section.numbers("body", 4), section.numbers("pivot", 3)
     norm = math.sqrt(sum(value * value for value in body))
     if not abs(norm - 1.0) < 1e-3:

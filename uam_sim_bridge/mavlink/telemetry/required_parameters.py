@@ -11,11 +11,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from uam_control.offboard.firmware import FIRMWARES, PX4, Firmware
-from uam_control.settings import yaml_file
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.settings.section import Section, read_section
 
 VEHICLE = "vehicle"  # name of the list for a real vehicle
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
@@ -97,20 +97,12 @@ class RequiredParameters(dict[str, Rule]):
         Raises ConfigurationError in one line: file, parameter, what is allowed.
         """
         file = Path(given) if Path(given).suffix else spoken.file(given)
-        sections = yaml_file.read(file, ConfigurationError)
-        if not isinstance(sections, dict):
-            raise ConfigurationError(f"{file}: sections of 'NAME: {{rule, why}}' lines expected")
-        rules = cls()
-        for section, entries in sections.items():
-            if not isinstance(entries, dict):
-                raise ConfigurationError(f"{file}: {section}: 'NAME: {{rule, why}}' lines expected")
-            for name, entry in entries.items():
+        top, rules = read_section(file, ConfigurationError), cls()
+        for section in map(top.section, top.values):
+            for name in section.values:
                 if name in rules:
-                    raise ConfigurationError(f"{file}: {name} is there twice")
-                try:
-                    rules[name] = _rule(entry)
-                except ValueError as error:
-                    raise ConfigurationError(f"{file}: {name}: {error}") from None
+                    raise section.error(name, "is there twice")
+                rules[name] = _rule(section, name)
         return rules
 
     def differences(
@@ -136,45 +128,23 @@ class RequiredParameters(dict[str, Rule]):
         return {name: rule.instead for name, rule in self.items() if rule.instead}
 
 
-def _rule(entry: Any) -> Rule:
-    """Return the rule of an entry of the file; raises ValueError."""
-    if not isinstance(entry, dict) or not isinstance(entry.get("why"), str):
-        raise ValueError("{rule, why: text} expected")
-    beside = "why", "optional", "instead"
-    given = {key: value for key, value in entry.items() if key not in beside}
-    instead = entry.get("instead", "")
-    if not isinstance(instead, str):
-        raise ValueError(f"instead: {instead!r}; the name of a parameter is allowed")
-    optional = entry.get("optional", False)
-    if not isinstance(optional, bool):
-        raise ValueError(f"optional: {optional!r}; true and false are allowed")
-    allowed = f"rules are {', '.join(_RULES)}"
-    if not given or not given.keys() <= set(_RULES):
-        raise ValueError(f"{', '.join(map(str, given)) or 'no rule'}; {allowed}")
-    if len(given) > 1 and given.keys() != {"least", "most"}:
-        raise ValueError(f"{', '.join(given)}: only least and most go together")
-    listed = given.get("one_of", [entry["is"]] if "is" in entry else [])
-    if not isinstance(listed, list) or ("one_of" in given and not listed):
-        raise ValueError("one_of: a list of numbers expected")
-    for value in (*listed, *(given[key] for key in ("least", "most", "bits") if key in given)):
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise ValueError(f"{value!r} is not a number")
-    bits = given.get("bits", 0)
-    if "bits" in given and (not isinstance(bits, int) or bits < 1):
-        raise ValueError(f"bits: {bits!r}; an integer from 1 on is allowed")
-    rule = Rule(
-        entry["why"],
-        tuple(float(value) for value in listed),
-        given.get("least", -math.inf),
-        given.get("most", math.inf),
-        bits,
-        optional,
-        instead,
+def _rule(section: Section, name: str) -> Rule:
+    """Return the rule `name` of a section of the file."""
+    entry = section.section(name)
+    entry.only((*_RULES, "why", "optional", "instead"))
+    given = [key for key in _RULES if entry.has(key)]
+    if len(given) != 1 and given != ["least", "most"]:
+        text = f"{', '.join(given) or 'no rule'}; one of {', '.join(_RULES)} expected"
+        raise section.error(name, f"{text}; only least and most go together")
+    least, most = entry.number("least", default=-math.inf), entry.number("most", default=math.inf)
+    if least > most:
+        raise section.error(name, f"least {least:g} is above most {most:g}")
+    return Rule(
+        entry.text("why"),
+        (entry.number("is"),) if "is" in given else entry.numbers("one_of", default=()),
+        least,
+        most,
+        entry.whole("bits", 1, default=0),
+        entry.switch("optional", default=False),
+        entry.text("instead", default=""),
     )
-    if rule.least > rule.most:
-        raise ValueError(f"least {rule.least:g} is above most {rule.most:g}")
-    return rule
