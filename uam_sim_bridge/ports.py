@@ -66,6 +66,28 @@ def in_use(kind: int, port: int) -> bool:
     return False
 
 
+def bound(protocol: str, host: str, port: int, purpose: str) -> socket.socket:
+    """Return a socket at a port of this machine; one of TCP listens.
+
+    purpose: what the port is for. Raises PortError in one line if the port is in use.
+    """
+    opened = socket.socket(socket.AF_INET, KINDS[protocol])
+    try:
+        if protocol == "TCP":
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind((host, port))
+        if protocol == "TCP":
+            opened.listen(1)
+    except (OSError, OverflowError) as error:
+        opened.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise PortError(
+            f"{protocol} port {port} for {purpose}: {reason}; stop the program that uses it or "
+            "choose another instance"
+        ) from None
+    return opened
+
+
 def discovery_port(domain: int, participant: int = 0) -> int:
     """Return the UDP port of a participant's discovery traffic (RTPS 2.2, 9.6.1.1).
 

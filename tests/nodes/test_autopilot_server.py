@@ -20,11 +20,12 @@ from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParam
 from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot import server
-from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
+from uam_sim_bridge.ports import PortError
 
 START_TIMEOUT = 60.0  # s: a first start compiles
 PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # for a loaded machine
@@ -393,6 +394,6 @@ def test_a_used_simulator_port_is_a_one_line_error():
         s.bind(("127.0.0.1", 0))
         s.listen()
         port = s.getsockname()[1]
-        with pytest.raises(HilError, match=f"TCP port {port} .*in use") as error:
+        with pytest.raises(PortError, match=f"TCP port {port} .*in use") as error:
             HilServer(port, 4)
         assert "\n" not in str(error.value)

@@ -17,24 +17,20 @@ import numpy as np
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.hil.hil_messages import HilMessages
 from uam_sim_bridge.paced_clock import SLICE, Patience
-from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.ports import PortError, bound
 
 
 def open_only_here(address: str) -> bool:
     """Return whether only programs of this machine can connect to a port at `address`.
 
-    Raises HilError if it is no IPv4 address.
+    Raises PortError if it is no IPv4 address.
     """
     try:
         return ipaddress.IPv4Address(address).is_loopback
     except ValueError:
-        raise HilError(
+        raise PortError(
             f"address '{address}' for the autopilot: an IPv4 address expected, as 127.0.0.1"
         ) from None
-
-
-class HilError(PortError):
-    """The simulator's port cannot be opened; the text is one line."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ class HilServer(HilMessages):
         parameters: HilParameters | None = None,
         seed: int = 0,
     ) -> None:
-        """Listen on TCP `port` for `motors` motors; seed: of the noise. Raises HilError if the
+        """Listen on TCP `port` for `motors` motors; seed: of the noise. Raises PortError if the
         port is in use."""
         super().__init__(motors, seed)
         self.parameters = (parameters or HilParameters()).validated()
@@ -72,18 +68,7 @@ class HilServer(HilMessages):
         self.missed = 0
         self._ever = False
         self._link: socket.socket | None = None
-        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            self._listener.bind((host, port))
-            self._listener.listen(1)
-        except (OSError, OverflowError) as error:
-            self._listener.close()
-            reason = getattr(error, "strerror", None) or str(error)
-            raise HilError(
-                f"TCP port {port} for the autopilot at {host}: {reason}; stop the program that "
-                "uses it or choose another instance"
-            ) from None
+        self._listener = bound("TCP", host, port, f"the autopilot at {host}")
 
     @property
     def connected(self) -> bool:

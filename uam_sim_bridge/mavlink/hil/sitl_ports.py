@@ -10,7 +10,7 @@ from typing import Any
 from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message
 from uam_sim_bridge.paced_clock import Patience
-from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP, PortError
+from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP, PortError, bound
 
 HOST = "127.0.0.1"
 SILENT = 5.0  # [s]; does not count while the simulation stands still
@@ -27,15 +27,8 @@ class UdpPort:
 
         Raises PortError if the local port is in use.
         """
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((HOST, local))
-        except OSError as error:
-            self._socket.close()
-            raise PortError(
-                f"UDP port {local} for the companion computer: {error.strerror}; "
-                "choose another instance or --mavlink-port"
-            ) from None
+        purpose = "the companion computer (--mavlink-port)"
+        self._socket = bound("UDP", HOST, local, purpose)
         self._socket.setblocking(False)
         self._codec = codec
         self._framer = Framer(codec)

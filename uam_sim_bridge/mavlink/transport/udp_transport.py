@@ -3,7 +3,7 @@
 import ipaddress
 import socket
 
-from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.ports import PortError, bound
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 READ_LIMIT = 1 << 20  # bytes per call: more than a tick's traffic; bounds the time of a call
@@ -40,16 +40,7 @@ class UdpTransport:
         self._read_limit = read_limit
         self.dropped = 0
         here = ipaddress.ip_address(self._remote[0]).is_loopback
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((LOOPBACK if here else EVERYWHERE, local_port))
-        except (OSError, OverflowError) as error:
-            self._socket.close()
-            reason = getattr(error, "strerror", None) or str(error)
-            raise PortError(
-                f"UDP port {local_port} for MAVLink: {reason}; stop the program that "
-                "uses it or choose another instance"
-            ) from None
+        self._socket = bound("UDP", LOOPBACK if here else EVERYWHERE, local_port, "MAVLink")
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> bool:
