@@ -260,7 +260,7 @@ def test_messages_of_the_joined_autopilot_are_late_in_order():
     rig.run(2.0)
     assert rig.port.round_trip == pytest.approx(0.004)
     late = iter([0.012, 0.0, 0.004] + 10 * [0.0])
-    rig.port.late_to, rig.port.late_from = lambda: next(late, 0.0), lambda: 0.02
+    rig.port.link.late_to, rig.port.link.late_from = lambda: next(late, 0.0), lambda: 0.02
     seen = []
     rig.port.autopilot.target = lambda time, target: seen.append((round(time, 3), target.thrust))
     begin = rig.ticks
@@ -268,9 +268,9 @@ def test_messages_of_the_joined_autopilot_are_late_in_order():
         time = 0.004 * (begin + i)
         rig.port.time = time
         if i:
-            late_to, rig.port.late_to = rig.port.late_to, lambda: 0.0
+            late_to, rig.port.link.late_to = rig.port.link.late_to, lambda: 0.0
             rig.port.poll(time)  # the round trip takes a value of its own
-            rig.port.late_to = late_to
+            rig.port.link.late_to = late_to
         else:
             rig.port._now = time
         rig.port.send_setpoint(AttitudeTarget.of_rates(REST, 0.1 * i), time)
@@ -314,7 +314,7 @@ def test_compiled_steps_of_the_joined_autopilot_are_late_as_its_methods():
 
 def test_late_reports_of_the_joined_autopilot():
     rig = Joined()
-    rig.port.late_from = lambda: 0.02
+    rig.port.link.late_from = lambda: 0.02
     while not rig.port.autopilot.commander.armed:
         rig.run(0.004)
     rig.run(0.02)
@@ -327,20 +327,20 @@ def test_heartbeats_that_are_lost_are_missed_after_3_s_and_a_change_is_reported_
     rig = Joined()
     rig.run(2.0)
     assert rig.port.connected(2.0) and rig.port.armed
-    rig.port.receives = lambda: False
+    rig.port.link.receives = lambda: False
     rig.port.autopilot.commander.armed = False
     rig.run(1.9)
     assert rig.port.armed and rig.port.connected(0.004 * rig.ticks)
     rig.run(1.2)
     assert not rig.port.connected(0.004 * rig.ticks)
-    rig.port.receives = lambda: True
+    rig.port.link.receives = lambda: True
     rig.run(1.1)
     assert not rig.port.armed and rig.port.connected(0.004 * rig.ticks)
 
 
 def test_nothing_passes_a_cut():
     rig = Joined()
-    rig.port.passes = lambda: False
+    rig.port.link.passes = lambda: False
     rig.run(2.5)
     autopilot = rig.port.autopilot
     assert not autopilot.commander.streaming(2.5) and not autopilot.commander.armed

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from uam_sim_bridge.autopilot.commander import take_setpoint
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.autopilot.cycle import CycleArrays, fly_rates, take_vision
 from uam_sim_bridge.autopilot.late_messages import (
+    OTHER,
     POSE,
     RATES,
     LateArrays,
@@ -37,6 +37,8 @@ from uam_sim_bridge.autopilot.late_messages import (
     push,
     take,
 )
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.faults.faulty_plant import DirectLink
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.plant.effects.network_delay import DelayArrays, SetpointDelay, late_at
 
@@ -50,16 +52,6 @@ class _Received(NamedTuple):
     texts: list[tuple[Severity, str]]
     status: AutopilotStatus | None
     landed: bool | None
-
-
-def always() -> bool:
-    """Whether a message of a link without faults arrives."""
-    return True
-
-
-def at_once() -> float:
-    """Return the delay [s] of a message of a link without faults."""
-    return 0.0
 
 
 # heartbeat, landed: sent, not yet received. [s]: tick of the last `poll`, shortest time between two
@@ -108,13 +100,10 @@ class JoinedAutopilot(FlightState):
         self.landed = self.failsafe = self.killed = False
         self.memory = record(WHOLE, REAL)
         self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0, 0.0)
-        self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
-        self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
-        self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
-        self.late_from: Callable[[], float] = at_once  # [s] of a message of the autopilot
+        self.link = DirectLink(Schedule())  # its faults
         self.network = network or SetpointDelay(0.0, 0.0, 0.0, 0)
         self._late, self._message = LateMessages(), np.zeros(8)
-        self._arrivals = {POSE: self._pose, RATES: self._rates}
+        self._arrivals = {POSE: self._pose, RATES: self._rates, OTHER: lambda deliver: deliver()}
         self._incoming: deque[tuple[float, _Received]] = deque()
         self._own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
         self._swap = prepared(swap_sample, *self._own_sample, *self._own_sample)
@@ -133,9 +122,8 @@ class JoinedAutopilot(FlightState):
     @property
     def steps(self) -> PortSteps | None:
         """See `AutopilotPort`: only of a link that has no faults."""
-        link = self.passes, self.receives, self.late_to, self.late_from
         usual = type(self) is JoinedAutopilot and type(self.autopilot) is Autopilot
-        return STEPS if usual and link == (always, always, at_once, at_once) else None
+        return None if self.link.timeline.all or not usual else STEPS
 
     @property
     def arrays(self) -> PortArrays:
@@ -180,7 +168,7 @@ class JoinedAutopilot(FlightState):
         gap between two ticks is no round trip.
         """
         self._begin_poll(self.memory, time)
-        late_to, late_from = self._delay(), self.late_from()
+        late_to, late_from = self._delay(), self.link.late_from()
         self.memory["late_to"], self.memory["late_from"] = late_to, late_from
         self._late.arrive(time, self._arrivals)
         texts = self.autopilot.commander.texts
@@ -194,7 +182,7 @@ class JoinedAutopilot(FlightState):
         status = self._told if self._heartbeat else None
         landed = self._told.landed if self._landed else None
         self._heartbeat = self._landed = False
-        if self.receives():
+        if self.link.receives():
             self._incoming.append((time + late, _Received(answers, texts, status, landed)))
 
     def _handle(self, time: float, received: _Received) -> None:
@@ -224,42 +212,33 @@ class JoinedAutopilot(FlightState):
         )
         request = self.sequence.update(time, seen)
         if request is not None:
-            self._send(lambda: self._command(request))
+            self._send(OTHER, lambda: self._command(request))
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
-        self._send_values(POSE, np.array([pose.stamp, *pose.position, *pose.quaternion]))
+        self._send(POSE, np.array([pose.stamp, *pose.position, *pose.quaternion]))
 
     def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
         if isinstance(target, AttitudeTarget) and target.type_mask == RATES_ALONE:
-            self._send_values(RATES, np.array([*target.rates, target.thrust]))
+            self._send(RATES, np.array([*target.rates, target.thrust]))
         else:
-            self._send(lambda: self._target(target))
+            self._send(OTHER, lambda: self._target(target))
 
     def _delay(self) -> float:
         """Return the delay [s] of a message that is sent now."""
-        return self.late_to() + self.network.at(self._now)
+        return self.link.late_to() + self.network.at(self._now)
 
-    def _send(self, deliver: Callable[[], object]) -> None:
-        """Send a message: call `deliver` in the cycle in which it arrives, if it arrives."""
-        if not self.passes():
+    def _send(self, kind: int, content: Any) -> None:
+        """Send a message, see `LateMessages.send`: in time for the present cycle if it is not late,
+        not at all if the link loses it."""
+        if not self.link.passes():
             return
         late = self._delay()
         if late or self._late.count:
-            self._late.send(self._now + late, deliver)
+            self._late.send(self._now + late, kind, content)
         else:
-            deliver()
-
-    def _send_values(self, kind: int, values: np.ndarray) -> None:
-        """Send a message of values, as `_send`."""
-        if not self.passes():
-            return
-        late = self._delay()
-        if late or self._late.count:
-            self._late.send_values(self._now + late, kind, values)
-        else:
-            self._arrivals[kind](values)
+            self._arrivals[kind](content)
 
     def _pose(self, values: np.ndarray) -> None:
         position, quaternion = swap_world(values[1:4]), swap_quaternion(values[4:8])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,27 +41,23 @@ class LateMessages:
         self._push = bound(push, self.arrays, 0.0, 0, np.zeros(VALUES))
         self._arrives, self._take = bound(arrives, self.arrays, 0.0), bound(take, self.arrays)
 
-    def send(self, due: float, deliver: Callable[[], object]) -> None:
-        """Let `deliver` be called by `arrive` at `due` [s]."""
-        self._functions.append(deliver)
-        self._push(due, OTHER, np.zeros(VALUES))
-
-    def send_values(self, due: float, kind: int, values: Sequence[float]) -> None:
-        """Send a POSE or RATES."""
+    def send(self, due: float, kind: int, content: Any) -> None:
+        """Let a message arrive at `due` [s]; content: values of a POSE or RATES, or for OTHER the
+        function that delivers it."""
         row = np.zeros(VALUES)
-        row[: len(values)] = values
+        if kind == OTHER:
+            self._functions.append(content)
+        else:
+            row[: len(content)] = content
         self._push(due, kind, row)
 
-    def arrive(self, time: float, deliver: dict[int, Callable[[np.ndarray], object]]) -> None:
-        """Deliver what is due at `time` [s]; deliver: for POSE and RATES."""
-        a = self.arrays
+    def arrive(self, time: float, deliver: dict[int, Callable[[Any], object]]) -> None:
+        """Deliver what is due at `time` [s]; deliver: by kind, takes the content."""
+        kinds, values = self.arrays.kinds, self.arrays.values
         while self._arrives(time):
             row = self._take()
-            kind = a.kinds.item(row)
-            if kind == OTHER:
-                self._functions.popleft()()
-            else:
-                deliver[kind](a.values[row].copy())
+            kind = kinds.item(row)
+            deliver[kind](self._functions.popleft() if kind == OTHER else values[row].copy())
 
 
 @borrowing

@@ -21,7 +21,7 @@ from uam_sim_bridge.faults.fault import (
     PlantCommands,
     PlantFault,
 )
-from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut, MavlinkDelay
+from uam_sim_bridge.faults.link_faults import MavlinkCut
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Disturbance, Plant, Samples, Truth, Vehicle
@@ -186,32 +186,20 @@ class DirectLink:
 
     def receives(self) -> bool:
         """Return whether messages from the autopilot arrive."""
-        return not any(fault.inwards and isinstance(fault, MavlinkCut) for fault in self._active)
+        cuts = (one for one in self.timeline.active if isinstance(one, MavlinkCut))
+        return not any(cut.inwards for cut in cuts)
 
     def passes(self) -> bool:
         """Return whether the next message to the autopilot arrives uncorrupted."""
-        return not any(self._loses(fault) for fault in self._active)
+        return not any(fault.loses(self._noise) for fault in self.timeline.active)
 
     def late_to(self) -> float:
         """Return the delay [s] of the next message to the autopilot."""
-        return self._late([fault for fault in self._active if fault.outwards])
+        return sum(one.late(self._noise) for one in self.timeline.active if one.outwards)
 
     def late_from(self) -> float:
         """Return the delay [s] of the next message from the autopilot."""
-        return self._late([fault for fault in self._active if fault.inwards])
-
-    def _late(self, faults: list[LinkFault]) -> float:
-        late = [fault.late(self._noise) for fault in faults if isinstance(fault, MavlinkDelay)]
-        return sum(late)
-
-    def _loses(self, fault: LinkFault) -> bool:
-        if isinstance(fault, MavlinkCorruption):
-            return self._noise.random() < fault.share
-        return isinstance(fault, MavlinkCut)
-
-    @property
-    def _active(self) -> list[LinkFault]:
-        return [one.fault for one in self.timeline.all if one.active]
+        return sum(one.late(self._noise) for one in self.timeline.active if one.inwards)
 
 
 class DirectFaults:

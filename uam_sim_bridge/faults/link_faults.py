@@ -27,9 +27,24 @@ class LinkFault(Fault):
         """Return whether it acts on messages from the autopilot."""
         return self.direction != TO
 
+    def late(self, noise: np.random.Generator) -> float:
+        """Return the delay [s] of the next message."""
+        return 0.0
+
+    def loses(self, noise: np.random.Generator) -> bool:
+        """Return whether the next message does not arrive whole."""
+        return False
+
+    def arriving(self, packet: bytes, noise: np.random.Generator) -> bytes | None:
+        """Return the next packet as it arrives; None: it does not."""
+        return None if self.loses(noise) else packet
+
 
 class MavlinkCut(LinkFault):
     """No message arrives."""
+
+    def loses(self, noise: np.random.Generator) -> bool:
+        return True
 
 
 class MavlinkDelay(LinkFault):
@@ -39,7 +54,6 @@ class MavlinkDelay(LinkFault):
     jitter: float = number(0.0, "largest further delay of a message, uniform", "s", 0.0, 10.0)
 
     def late(self, noise: np.random.Generator) -> float:
-        """Return the delay [s] of the next message."""
         return self.delay + (noise.uniform(0.0, self.jitter) if self.jitter else 0.0)
 
 
@@ -47,3 +61,13 @@ class MavlinkCorruption(LinkFault):
     """Some packets have one wrong byte, and the receiver discards them."""
 
     share: float = number(0.2, "fraction of wrong packets", "1", 0.0, 1.0)
+
+    def loses(self, noise: np.random.Generator) -> bool:
+        return noise.random() < self.share
+
+    def arriving(self, packet: bytes, noise: np.random.Generator) -> bytes:
+        if not self.loses(noise):
+            return packet
+        corrupted = bytearray(packet)
+        corrupted[noise.integers(len(corrupted))] ^= int(noise.integers(1, 256))
+        return bytes(corrupted)

@@ -79,11 +79,7 @@ class DirectFlight:
         if self._faults:
             more = {"step": self._faults.step, "decides": False}
             self.control.insert("bridge", "faults", self._update_faults, **more)
-        if self._faults and self._faults.link.timeline.all:
-            self.autopilot.passes = self._faults.link.passes
-            self.autopilot.receives = self._faults.link.receives
-            self.autopilot.late_to = self._faults.link.late_to
-            self.autopilot.late_from = self._faults.link.late_from
+            self.autopilot.link = self._faults.link
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
         self._complete = False  # every kind of sensor has delivered
