@@ -3,13 +3,14 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from settled_join import SettledJoin
 
 from uam_msgs_py.node.joins import StampJoin
 
 
-def joined(depth=32):
+def joined(depth=32, kind=SettledJoin):
     fired = []
-    join = StampJoin(["a", "b", "c"], lambda stamp, *values: fired.append((stamp, values)), depth)
+    join = kind(["a", "b", "c"], lambda stamp, *values: fired.append((stamp, values)), depth)
     return join, fired
 
 
@@ -72,8 +73,7 @@ def test_memory_is_bounded():
 
 @given(st.integers(0, 9))
 def test_a_long_backlog_keeps_only_the_newest_tick(ticks):
-    join, fired = joined()
-    join.deferred = True
+    join, fired = joined(kind=StampJoin)
     for stamp in range(ticks):
         for name in "abc":
             join.add(name, stamp, stamp)

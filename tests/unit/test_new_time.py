@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from settled_join import SettledJoin
 
 from uam_control.mission import Mission, MissionParameters, StartParameters, load_scenario
 from uam_control.offboard.modes import Mode
@@ -13,12 +14,11 @@ from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import State
 from uam_control.vehicle import derived_parameters, load_description
-from uam_msgs_py.node.joins import StampJoin
 
 
 def test_a_join_begins_anew_with_the_stamps_of_a_new_simulation():
     fired = []
-    join = StampJoin(["a", "b"], lambda stamp, a, b: fired.append((stamp, a, b)))
+    join = SettledJoin(["a", "b"], lambda stamp, a, b: fired.append((stamp, a, b)))
     for stamp in (20 * SECOND, 4_000_000, 8_000_000):
         join.add("a", stamp, 1)
         join.add("b", stamp, 2)

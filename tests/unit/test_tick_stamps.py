@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from settled_join import SettledJoin
 
 from uam_control.stages.tick_stamps import LONG, TickStamps, follows, next_stamp, serves
-from uam_msgs_py.node.joins import Ahead, StampJoin
+from uam_msgs_py.node.joins import Ahead
 
 PERIOD = 4_000_000
 MS = 1_000_000
@@ -76,7 +77,7 @@ def test_an_older_sample_starts_no_tick_and_is_not_a_repeated_one():
 
 def test_a_reference_of_a_missing_tick_is_no_lost_tick():
     fired = []
-    join = StampJoin(
+    join = SettledJoin(
         ("state", "reference"), lambda *values: fired.append(values), ahead=Ahead("reference")
     )
     join.add("reference", 1, "r1")
@@ -93,7 +94,7 @@ def early_join():
     """Join of state and a reference (a stamp) that is sent one tick ahead."""
     fired = []
     ahead = Ahead("reference", partial(serves, period=PERIOD), lambda value, step: value + step)
-    return StampJoin(("state", "reference"), lambda *values: fired.append(values), ahead=ahead), (
+    return SettledJoin(("state", "reference"), lambda *values: fired.append(values), ahead=ahead), (
         fired
     )
 

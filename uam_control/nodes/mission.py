@@ -198,8 +198,6 @@ class MissionNode(UamNode):
 
     def _on_state(self, data: bytes) -> None:
         self._states.put(read_state(data, self._joints))
-        if not self.deferred:
-            self.settle()
 
     def settle(self) -> None:
         for stamp, state in self._states.take():

@@ -113,8 +113,6 @@ class StateEstimatorNode(UamNode):
         # one state per sample: the filters need every sample
         biases = self.stage.estimator.imu_bias if self.stage.bias_due else None
         self._updates.put((self.stage.stamp, state.copy(), biases, begun))
-        if not self.deferred:
-            self.settle()
 
     def estimated(self, take: Callable[[], T]) -> T | None:
         """Return take(), which gives the stage an IMU sample; None if it is an older one."""

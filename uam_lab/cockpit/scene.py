@@ -145,8 +145,6 @@ class SceneNode(UamNode):
     def _on_state(self, data: bytes) -> None:
         self._state = read_state(data)
         _store(self._states, *self._state)
-        if not self.deferred:
-            self.settle()
 
     def _on_reference(self, data: bytes) -> None:
         _store(self._references, *read_reference(data))
@@ -163,9 +161,8 @@ class SceneNode(UamNode):
 
     def settle(self) -> None:
         """Publish transforms, errors and markers of the newest state when they are due."""
-        if self.deferred:
-            for subscription in self._late:
-                self.take_waiting(subscription)
+        for subscription in self._late:
+            self.take_waiting(subscription)
         if self._state is None or self._state[0] < self._due:
             return
         begun = time.perf_counter()

@@ -68,7 +68,6 @@ class UamNode(TunableNode):
         self.joins: list[StampJoin] = []
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
         self.ticks = 0
-        self.deferred = False
         self._loop = LoopTime()
         self._at_last_report = (0, 0.0)
         self._dropped_before = 0
@@ -147,12 +146,6 @@ class UamNode(TunableNode):
         """
         for message in self.door.messages(subscription):
             subscription.callback(message)
-
-    def defer(self) -> None:
-        """From now on act in `settle`, after all received messages are delivered."""
-        self.deferred = True
-        for join in self.joins:
-            join.deferred = True
 
     def stalled(self) -> bool:
         """Return whether a trigger arrived before the other inputs of its tick."""

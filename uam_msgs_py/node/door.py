@@ -1,20 +1,17 @@
 """The one way of received messages into a program: what it cannot use is refused and counted.
 
-Anyone may publish anything: bytes that are no message of the topic's type, texts and numbers that
-no reader expects. None of it ends a program. The next good message is used.
+Anyone may publish anything: bytes that are no message of the topic's type, other joint names or
+their order, wrong lengths, numbers that are not finite, stamps of another clock. None of it ends a
+program. The next good message is used.
 
 Messages are taken serialized: rclpy would raise for bytes that are none, and the middleware would
 discard them without a word.
-
-Other joint names or their order, wrong lengths, numbers that are not finite, stamps of another
-clock: the next good message is used.
 """
 
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from rclpy.node import Node
@@ -32,38 +29,28 @@ NAMES_PERIOD = 0.1  # s of wall time between two looks at who publishes a topic
 T = TypeVar("T")
 
 
-@dataclass
-class Refused:
-    """sender: node name; rightful: name of the node that may publish; reason: of the newest."""
-
-    sender: str
-    rightful: str
-    reason: str = ""
-    count: int = 0
-
-
 class Refusals:
     """Counts the refused messages of each topic and sender."""
 
     def __init__(self) -> None:
-        self._found: dict[tuple[str, str], Refused] = {}
+        # topic, sender → count, newest reason, name of the node that may publish
+        self._found: dict[tuple[str, str], tuple[int, str, str]] = {}
 
     def note(self, topic: str, sender: str, rightful: str, reason: str) -> None:
         """Count a message; topic: absolute name; sender, rightful: node names."""
-        one = self._found.setdefault((topic, sender), Refused(sender, rightful))
-        one.rightful, one.reason, one.count = rightful, reason, one.count + 1
+        before = self._found.get((topic, sender))
+        self._found[topic, sender] = (before[0] if before else 0) + 1, reason, rightful
 
     @property
     def count(self) -> int:
         """Number of refused messages."""
-        return sum(one.count for one in self._found.values())
+        return sum(count for count, _, _ in self._found.values())
 
     def texts(self) -> list[str]:
         """Return one line per topic and sender."""
         return [
-            f"{topic}: refused {one.sender} ({one.count} messages): {one.reason}; "
-            f"publisher is {one.rightful}"
-            for (topic, _), one in self._found.items()
+            f"{topic}: refused {sender} ({count} messages): {reason}; publisher is {rightful}"
+            for (topic, sender), (count, reason, rightful) in self._found.items()
         ]
 
 

@@ -26,7 +26,7 @@ class LeanExecutor:
     After a wake-up messages are delivered in the order of the nodes' subscriptions, triggers last.
     A message whose callback raises is refused, see `Door`; an exception of `settle` ends `spin`.
 
-    If the node has `defer` and `settle`, `settle` is called after all received messages of a
+    If a node has `settle`, it is called after all received messages of a
     wake-up are delivered; the node then has its whole backlog.
 
     A wake-up costs more time than a tick. A node may therefore name the input that normally
@@ -61,8 +61,6 @@ class LeanExecutor:
         ]
         self._rest = OtherEntities(self._nodes)
         self._settle = _those_of(self._nodes, "settle")
-        for defer in _those_of(self._nodes, "defer"):
-            defer()
         self._at_rest, self._often = at_rest, often
         self._times = getattr(first, "times", NoTickTimes())
         every = (getattr(node, "times", self._times) for node in self._nodes)

@@ -62,15 +62,15 @@ class _Tick:
 
 
 class StampJoin:
-    """Calls `fire(stamp, *values)` when all inputs have delivered their values for a stamp.
+    """Collects ticks, for each of which all inputs have delivered their values for a stamp.
+
+    `settle` calls `fire(stamp, *values)` for them, see `Backlog`.
 
     Ticks fire in the order of their stamps. A firing tick drops older incomplete ticks; these, and
     later messages for them, are counted in `dropped`. Stamps that go back by more than NEW_TIME
     belong to a new simulation: the join begins anew. An input that is sent one tick `ahead` makes
     no tick alone: there is none if the sample that starts it is missing. Its value may serve the
     tick that follows, see `Ahead`.
-
-    deferred: complete ticks fire in `settle`, not in `add`; see `Backlog`.
     """
 
     def __init__(
@@ -92,12 +92,11 @@ class StampJoin:
         self._open: dict[int, _Tick] = {}
         self._last = -1
         self._backlog = Backlog()
-        self.deferred = False
         self._dropped = 0
         self.last_seen: dict[str, int | None] = dict.fromkeys(inputs)
 
     def add(self, name: str, stamp: int, value: Any) -> None:
-        """Add the value (not None) of input `name` for `stamp` [ns]; may fire."""
+        """Add the value (not None) of input `name` for `stamp` [ns]."""
         self.last_seen[name] = stamp
         if stamp < self._last - NEW_TIME:
             self._open.clear()
@@ -113,12 +112,12 @@ class StampJoin:
         place = self._index[name]
         tick.missing -= tick.values[place] is None
         tick.values[place] = value
-        self._fire_if_complete(stamp)
+        self._put_if_complete(stamp)
         if place == self._ahead and len(self._open) > 1:  # it may serve a tick of another stamp
             for other in sorted(self._open):
-                self._fire_if_complete(other)
+                self._put_if_complete(other)
 
-    def _fire_if_complete(self, stamp: int) -> None:
+    def _put_if_complete(self, stamp: int) -> None:
         tick = self._open.get(stamp)
         if tick is None:
             return
@@ -130,8 +129,6 @@ class StampJoin:
             tick.missing = 0
         self._dropped += self._close(stamp) - 1  # all but this one
         self._backlog.put((stamp, tick.values))
-        if not self.deferred:
-            self.settle()
 
     def _served(self, stamp: int, tick: _Tick) -> Any:
         """Take what the input `ahead` has for the tick `stamp` under another stamp, or None.
