@@ -14,6 +14,7 @@ from set_clock import SetClock
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import load_description
 from uam_lab.flights.rehearsal.engine import RehearsalCourse
+from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.devices.mocap import calibration
 from uam_sim_bridge.devices.mocap.calibration import Calibration
@@ -304,34 +305,18 @@ def test_a_file_of_the_matrix_has_promises_for_all_flights():
         assert (cell.moment == "start") == (cell.promise.outcomes == (REFUSED,))
 
 
-class RefusesMeanwhile:
-    """A start that is refused while the vehicle's messages are read."""
+def test_a_start_refused_at_any_moment_is_never_called_an_interrupt(monkeypatch):
+    starter = SimpleNamespace(started=False, refused="", waits_for="the lists")
+    course, said = RehearsalCourse.__new__(RehearsalCourse), []
 
-    def __init__(self):
-        self.started, self.refused, self.waits_for = False, "", "the lists"
-
-    def vehicle_course(self, listener):
-        return self
-
-    def starter(self):
-        return self
-
-    def say(self, line):
-        pass
-
-    def running(self, name):
+    def look(_):
+        """The start is refused while the vehicle's messages are read."""
+        starter.waits_for = starter.refused = "open: clear"
         return True
 
-    def goes_on(self):
-        self.waits_for = self.refused = "open: clear"
-        return True
-
-
-def test_a_start_refused_at_any_moment_is_never_called_an_interrupt():
-    rehearsal = RefusesMeanwhile()
-    stored = SimpleNamespace(
-        vehicle_course=rehearsal.vehicle_course, starter=rehearsal.starter, say=rehearsal.say
-    )
-    course = RehearsalCourse(stored, rehearsal, None)
+    monkeypatch.setattr(VehicleCourse, "goes_on", look)
+    course._starter, course._said, course._say_at = starter, "", 0.0
+    course.flight = SimpleNamespace(observer=SimpleNamespace(message=said.append))
+    course.children = SimpleNamespace(running=lambda name: True)
     assert not course.goes_on()
-    assert stored.refused == "open: clear"
+    assert course.refused == "open: clear" and said == ["before the start: open: clear"]

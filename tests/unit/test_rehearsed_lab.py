@@ -271,13 +271,13 @@ def test_ctrl_c_ends_a_matrix_of_rehearsals_and_the_same_command_continues(
         "{fault: mocap_renamed}]}"
     )
 
-    def fly(lab, settings, observer, stop, checklist):
+    def fly(lab, settings, folder, observer, stop, checklist):
         flown.append(settings.faults)
         if len(flown) == 2:
             stop.repeat()
-        return tmp_path, Outcome(series=None, failure=REFUSAL + "no answer"), None
+        return Outcome(series=None, failure=REFUSAL + "no answer")
 
-    monkeypatch.setattr(rehearsed, "fly", fly)
+    monkeypatch.setattr(rehearsed.engine, "fly", fly)
     out = tmp_path / "out"
     command = ["faults", "--engine", "rehearsal", "--matrix", str(matrix), "--out", str(out)]
     assert main(command) == INTERRUPTED and len(flown) == 2

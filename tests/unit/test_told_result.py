@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from uam_lab.cli import rehearse
-from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, tell
+from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, fly, tell
 from uam_lab.flights.library.flight_result import FlightResult
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.records.results.outcome import Outcome
@@ -35,4 +35,4 @@ def test_the_reason_goes_to_the_errors_and_the_rest_to_the_output(
 
 
 def test_a_rehearsal_ends_as_a_flight():
-    assert rehearse.tell is tell
+    assert rehearse.fly is fly

@@ -199,8 +199,8 @@ class Listener:
 def course(status, stop):
     """A course with that status, without ROS; its commands to land are counted."""
     made = VehicleCourse.__new__(VehicleCourse)
-    made._listener, made._stop, made._done_at, made._landing = Listener(), stop, None, False
-    made._listener.newest = [] if status is None else [status]
+    made.listener, made._stop, made._done_at, made._landing = Listener(), stop, None, False
+    made.listener.newest = [] if status is None else [status]
     made.landings = []
     made._look, made._land = (lambda now: None), lambda: made.landings.append(1)
     return made
@@ -230,7 +230,6 @@ def test_in_the_air_the_first_stop_lands_and_the_second_one_ends(state):
 
 
 def test_the_flight_ends_some_time_after_the_mission(monkeypatch):
-    from uam_lab.flights.vehicle import vehicle_engine
 
     now = [100.0]
     monkeypatch.setattr(vehicle_engine.time, "monotonic", lambda: now[0])
@@ -264,9 +263,10 @@ def test_wrong_use_is_refused_in_one_line(capsys, tmp_path):
 
 
 def test_the_flight_of_a_vehicle_continues_without_recorder_and_cockpit(tmp_path):
-    children = Mock()
     flight = FlightRun(settings_of(LAB), ResultFolder(tmp_path), None, None, None, "")
-    vehicle_engine.start_nodes(children, LAB, flight)
-    started = children.start.call_args_list
+    course = VehicleCourse(LAB, flight)
+    course.children = Mock()
+    course.start()
+    started = course.children.start.call_args_list
     optional = {call.args[0] for call in started if call.kwargs["optional"]}
     assert optional == {"recorder", "cockpit"}

@@ -23,14 +23,13 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING
 
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.cli.command import (
     Command,
     chosen_effects,
@@ -51,7 +50,7 @@ from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
 
 if TYPE_CHECKING:
-    from uam_lab.experiments.faults.matrix import Cell, Matrix
+    from uam_lab.experiments.faults.matrix import Matrix
     from uam_lab.experiments.faults.trial import FaultResult
 
 BROKEN = 1
@@ -86,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     from uam_lab.experiments.faults import matrix as fault_matrix
     from uam_lab.experiments.faults import report
-    from uam_lab.experiments.faults.trial import ROWS
+    from uam_lab.experiments.faults.trial import ROWS, FaultTrial, measure
     from uam_lab.experiments.trials.experiment import Experiment
 
     place = place_of(options)
@@ -102,23 +101,40 @@ def run(options: argparse.Namespace) -> int:
             plant_preset=options.plant_preset,
             effect=options.effects,
         )
-        vehicle = load_lab(options.config).vehicle
+        lab = load_lab(options.config)
+        vehicle, profile = lab.vehicle, settings_of(lab).profile
     else:
         vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
+        lab, profile = None, given_profile(options.profile, vehicle)
     file = configuration.named("campaign", options.matrix)
     given = (options.engine, options.only, options.moment, options.scenario)
     matrix = fault_matrix.read(file, *given, vehicle, options.draws or 0)
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
-    prepared = _rehearsals if rehearsed else _flights
-    kind, make, measure, further = prepared(options, matrix, vehicle)
+    kind = "cables" if rehearsed else "faults"
+    mass = load_scenario(matrix.scenario, vehicle).payload_mass
+    changes = presets.added({}, chosen_effects(options))
     out = make_folder(options.out, kind)
+    flight = partial(
+        FaultTrial,
+        profile=profile,
+        payload_mass=mass,
+        seed=options.seed,
+        scenario=matrix.scenario,
+        vehicle_changes=changes,
+        engine=options.engine,
+        clock=options.clock,
+        lab=options.config if rehearsed else "",
+        broken=out / "broken",
+    )
     known = replace(matrix, draws=bool(matrix.draws))  # more draws are a longer table
     settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
+    further = lab, profile.sets, profile.bridge(), changes
     of = settings | {"matrix": known, "profile and effects": further}
     experiment = Experiment.of(kind, out, ROWS, place, vehicle, matrix.scenario, of, measure)
-    results = experiment.fly_all([make(cell, out) for cell in cells], _about)
+    trials = [flight(label=cell.fault, faults=cell.schedule, cell=cell) for cell in cells]
+    results = experiment.fly_all(trials, _about)
     again = _again(options, matrix)
     summary, page = report.write(out, matrix, results, vehicle.name, command_line(), again)
     say(summary)
@@ -141,52 +157,3 @@ def _again(options: argparse.Namespace, matrix: Matrix) -> str:
     }
     chosen = [f"--{name} {value}" for name, value in named.items() if value is not None]
     return " ".join(["uam fly", *chosen, *map(shlex.quote, repeated_words(options))])
-
-
-class _Prepared(NamedTuple):
-    """kind: of the flights; make: a trial from its cell and the result folder; measure: flies it;
-    inputs: of all flights, beside those of every engine."""
-
-    kind: str
-    make: Callable[[Cell, Path], Any]
-    measure: Callable[[Any], FaultResult]
-    inputs: tuple[object, ...]
-
-
-def _flights(options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription) -> _Prepared:
-    from uam_lab.experiments.faults.trial import FaultTrial, measure
-
-    profile = given_profile(options.profile, vehicle)
-    mass = load_scenario(matrix.scenario, vehicle).payload_mass
-    changes = presets.added({}, chosen_effects(options))
-
-    def make(cell: Cell, out: Path) -> FaultTrial:
-        return FaultTrial(
-            cell.fault,
-            profile,
-            mass,
-            options.seed,
-            matrix.scenario,
-            vehicle_changes=changes,
-            faults=cell.schedule,
-            engine=options.engine,
-            clock=options.clock,
-            cell=cell,
-        )
-
-    return _Prepared("faults", make, measure, (profile.sets, profile.bridge(), changes))
-
-
-def _rehearsals(
-    options: argparse.Namespace, matrix: Matrix, vehicle: VehicleDescription
-) -> _Prepared:
-    from uam_lab.experiments.faults.rehearsed import RehearsedTrial, measure
-
-    lab = load_lab(options.config)
-    profile = settings_of(lab).profile
-
-    def make(cell: Cell, out: Path) -> RehearsedTrial:
-        kept = out / "broken"
-        return RehearsedTrial(cell, options.config, matrix.scenario, options.seed, kept)
-
-    return _Prepared("cables", make, measure, (lab, profile.sets, profile.bridge()))

@@ -36,8 +36,9 @@ Exit status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong 
 
 import argparse
 import contextlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from pathlib import Path
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
@@ -147,10 +148,12 @@ def fly(
     report: bool,
     engine: Engine | None = None,
     name: str = "fly",
+    further: Callable[[Path], Iterable[str]] = lambda folder: (),
 ) -> int:
     """Fly and report; return the exit status. Raises one-line errors before the flight starts.
 
-    engine: None for that of the settings; name: of the command.
+    engine: None for that of the settings; name: of the command; further: lines about a result
+    folder, which follow the summary.
     """
     landing = settings.scenario.landing
     console = Terminal()
@@ -158,7 +161,7 @@ def fly(
         flight = Flight(checked=settings, observer=progress, stop=stop, flown_by=engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()
-    return tell(console, settings, flight.result, name, video, report)
+    return tell(console, settings, flight.result, name, video, report, further(flight.folder))
 
 
 def tell(

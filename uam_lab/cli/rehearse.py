@@ -19,18 +19,16 @@ Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
 import argparse
 import os
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_lab.cli.command import Command, chosen_effects, number
-from uam_lab.cli.fly import tell
+from uam_lab.cli.fly import fly
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import require_ros
-from uam_lab.flights.library.flight_result import FlightResult
-from uam_lab.flights.processes.interrupts import Interrupts
-from uam_lab.flights.progress import Progress
 from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab, settings_of
-from uam_lab.records.results.result_folder import known_json
-from uam_lab.records.results.terminal import Terminal
+from uam_lab.records.results.result_folder import known_json, make_folder
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.px4 import px4_parameters
@@ -81,8 +79,7 @@ def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
 
 def run(options: argparse.Namespace) -> int:
     require_ros()
-    from uam_lab.flights.rehearsal import device_figures
-    from uam_lab.flights.rehearsal.engine import fly
+    from uam_lab.flights.rehearsal import device_figures, engine
 
     lab = load_lab(options.config)
     if options.scenario:
@@ -93,22 +90,23 @@ def run(options: argparse.Namespace) -> int:
     for one in cables.faults:
         if one.fault.PLACE != CABLE:
             raise FaultError(f"{one.fault.NAME}: not of a cable: uam fly --fault")
+    px4 = px4_of(options.px4_dir, options.px4_params)
+    if px4 is not None and lab.magnet.output.magnet == GRIPPER:
+        px4.require_gripper()
+    effects = presets.added({}, chosen_effects(options))
     settings = replace(
         settings,
         seed=options.seed,
         payload_mass=mass,
-        out=options.out,
-        vehicle_changes=presets.added({}, chosen_effects(options)),
+        out=options.out or make_folder(None, settings.scenario.name, "rehearsal"),
+        vehicle_changes=effects,
         faults=cables,
-        px4=px4_of(options.px4_dir, options.px4_params),
+        px4=px4,
         px4_params=tuple(options.px4_params),
     )
-    if settings.px4 is not None and lab.magnet.output.magnet == GRIPPER:
-        settings.px4.require_gripper()
-    console = Terminal()
-    landing = settings.scenario.landing
-    with Progress(console, landing.end) as progress, Interrupts() as stop:
-        folder, outcome, metrics = fly(lab, settings, progress, stop)
-    result = FlightResult(folder, metrics, outcome)
-    further = device_figures.lines(known_json(folder / device_figures.NAME))
-    return tell(console, settings, result, "rehearse", options.video, options.report, further)
+
+    def further(folder: Path) -> list[str]:
+        return device_figures.lines(known_json(folder / device_figures.NAME))
+
+    flown_by = partial(engine.fly, lab)
+    return fly(settings, options.video, options.report, flown_by, "rehearse", further)

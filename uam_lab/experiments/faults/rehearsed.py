@@ -2,55 +2,43 @@
 
 import shutil
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 from uam_lab.experiments.faults import trial as fault_trial
 from uam_lab.experiments.faults.matrix import Cell
-from uam_lab.experiments.faults.trial import FaultResult
+from uam_lab.experiments.faults.trial import FaultResult, FaultTrial
 from uam_lab.experiments.trials.outcome import LOST, REFUSED
+from uam_lab.flights.conclude import conclude
+from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import Interrupts
-from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
-from uam_lab.flights.rehearsal.engine import fly
+from uam_lab.flights.rehearsal import engine
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of
 from uam_lab.records.results.outcome import Outcome
-from uam_sim_bridge.faults.feasibility import REHEARSAL
+from uam_lab.records.results.result_folder import ResultFolder
 from uam_sim_bridge.faults.schedule import FROM_START
 
 
-@dataclass(frozen=True)
-class RehearsedTrial:
-    """One cell of the matrix; lab: name or file; kept: folder of flights that broke a promise."""
-
-    cell: Cell
-    lab: str
-    scenario: str
-    seed: int
-    kept: Path
-    engine: ClassVar[str] = REHEARSAL  # as of a Trial
-    keep: ClassVar[None] = None
-
-
-def measure(trial: RehearsedTrial) -> FaultResult:
+def measure(trial: FaultTrial) -> FaultResult:
     """Rehearse a trial; return its result. Raises ConfigurationError, ScenarioError, LabError.
 
     Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
     """
     cell = trial.cell
     lab = replace(load_lab(trial.lab), scenario=trial.scenario)
-    settings = settings_of(lab)
-    with tempfile.TemporaryDirectory(prefix="uam-rehearsal-") as folder, Interrupts() as stop:
-        out = Path(folder) / "flight"
-        made = replace(settings, out=out, seed=trial.seed, faults=cell.schedule)
-        _, outcome, figures = fly(lab, made, Observer(), stop, with_checklist(cell))
+    settings = replace(settings_of(lab), seed=trial.seed, faults=cell.schedule)
+    prepare()
+    with tempfile.TemporaryDirectory(prefix="uam-rehearsal-") as place, Interrupts() as stop:
+        folder = ResultFolder(Path(place))
+        outcome = engine.fly(lab, settings, folder, Observer(), stop, with_checklist(cell))
+        figures = conclude(settings, folder, outcome)
         if stop.raised:
             raise KeyboardInterrupt
         result = judged(cell, outcome, figures)
         if result.kept is False:
             name = f"{cell.fault} {cell.moment}".replace(" ", "_").replace("/", "_")
-            shutil.copytree(out, trial.kept / name, symlinks=True, dirs_exist_ok=True)
+            shutil.copytree(place, trial.broken / name, symlinks=True, dirs_exist_ok=True)
     return result
 
 
@@ -62,7 +50,7 @@ def with_checklist(cell: Cell) -> bool:
 
 def judged(cell: Cell, outcome: Outcome, figures: dict | None) -> FaultResult:
     """Return the result of a rehearsal; figures: its metrics, None without a recording."""
-    if not outcome.failure.startswith(REFUSAL):
+    if not outcome.failure.startswith(engine.REFUSED):
         return fault_trial.judged(cell, outcome, figures)
     promise = cell.promise
     flown = outcome.series is not None and bool(outcome.series.flown.any())

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from uam_lab.experiments.faults.matrix import Cell
@@ -14,9 +15,12 @@ from uam_lab.records.results.outcome import Outcome
 
 @dataclass(frozen=True, kw_only=True)
 class FaultTrial(Trial):
-    """One flight, of a cell of the matrix."""
+    """One flight, of a cell of the matrix; lab: name or file of a rehearsal; broken: folder of the
+    rehearsals that broke a promise."""
 
     cell: Cell
+    lab: str = ""
+    broken: Path = Path()
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,11 @@ class FaultResult:
 
 
 def measure(trial: FaultTrial) -> FaultResult:
-    """Fly a trial; return its result. Raises ConfigurationError, ScenarioError."""
+    """Fly or rehearse a trial; return its result. Raises ConfigurationError, ScenarioError."""
+    if trial.lab:
+        from uam_lab.experiments.faults import rehearsed  # needs ROS
+
+        return rehearsed.measure(trial)
     outcome = fly(trial)
     recorded = outcome.series is not None
     figures = figures_of(trial, outcome, outcome.reason) if recorded else None

@@ -6,26 +6,25 @@ It releases all processes, devices and ports, also after an error.
 """
 
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from uam_lab.flights.conclude import conclude
-from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.flights.processes.processes import NodeFailed, Processes
+from uam_lab.flights.processes.processes import NodeFailed
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
 from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import logged
-from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
+from uam_lab.flights.ros.supervise import FlightRun
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab import Lab
 from uam_lab.flights.vehicle.lab_file import settings_of
-from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse, start_nodes
+from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results.outcome import Outcome
@@ -35,7 +34,7 @@ from uam_sim_bridge.nodes.laboratory import READY
 from uam_sim_bridge.ports import Reservation
 
 REFUSED = "start refused: "
-DEVICES, LOGS = "devices", "logs"  # in the result folder
+LOGS = "logs"  # in the result folder
 POLL = 0.05  # [s]
 SAY_PERIOD = 5.0  # [s] between two lines about the lists
 DEVICES_WAIT = 60.0  # [s] until the laboratory has its devices
@@ -80,127 +79,85 @@ def _prepare_checklist(sections: dict[str, dict[str, Any]], required: bool) -> N
         sections[CHECKLIST] = ABSENT | sections[CHECKLIST]
 
 
-class _Rehearsal:
-    """The processes of one rehearsal; `refused`: why the mission was not started, "" if it was.
+class RehearsalCourse(VehicleCourse):
+    """That of the vehicle, with a laboratory that ends it and a person who starts it.
 
-    `started`: whether the mission has accepted the start.
+    refused: why the mission was not started, "" if it was; started: whether it has accepted.
     """
 
+    optional = (wiring.COCKPIT,)  # a rehearsal is judged by its log
+
     def __init__(self, lab: Lab, flight: FlightRun, checklist: bool) -> None:
-        self._lab, self._flight = lab, flight
+        super().__init__(lab, flight)
         self.refused, self.started = "", False
         self._lists = checklist and CHECKLIST in vehicle_nodes.modules(lab)
+        self.without = () if self._lists else (CHECKLIST,)
+        self._said, self._say_at = "", 0.0  # [s] time.monotonic()
 
-    def run(self, devices: Path) -> NodeFailed | None:
-        """Run all processes until the laboratory ends or the start is refused."""
-
-        def start(children: Processes) -> None:
-            if self._start_laboratory(children, devices):
-                left_out = () if self._lists else (CHECKLIST,)
-                # a rehearsal is judged by its log
-                start_nodes(children, self._lab, self._flight, left_out, (wiring.COCKPIT,))
-
-        failure, _ = supervise.run(
-            self._flight,
-            start,
-            lambda children: [
-                f"{len(children.names)} processes in ROS domain {self._flight.ports.domain}; "
-                f"devices in {devices}"
-            ],
-            lambda children, listener: RehearsalCourse(self, children, listener),
-        )
-        return failure
-
-    def _start_laboratory(self, children: Processes, devices: Path) -> bool:
-        """Start laboratory and autopilot; return whether the devices are there.
+    def start(self) -> None:
+        """Start laboratory and autopilot; where the devices are there, the nodes.
 
         Raises NodeFailed.
         """
-        settings, folder, ports, _, stop, _ = self._flight
-        children.start(LABORATORY, LABORATORY_MODULE, self._flight.ros_arguments, may_end=True)
+        flight, children = self.flight, self.children
+        devices = devices_of(flight.folder)
+        children.start(LABORATORY, LABORATORY_MODULE, flight.ros_arguments, may_end=True)
         patience = time.monotonic() + DEVICES_WAIT
         while not (devices / READY).exists():
             children.check()
             if not children.running(LABORATORY) or time.monotonic() > patience:
-                raise NodeFailed(LABORATORY, 0, folder.path / LOGS / f"{LABORATORY}.log")
-            if stop.raised:
-                return False
+                log = flight.folder.path / LOGS / f"{LABORATORY}.log"
+                raise NodeFailed(LABORATORY, 0, log)
+            if flight.stop.raised:
+                return
             time.sleep(POLL)
-        module, own = laboratory_process.autopilot(self._lab, settings, devices, folder.path, ports)
+        module, own = laboratory_process.autopilot(
+            self.lab, flight.settings, devices, flight.folder.path, flight.ports
+        )
         children.start(AUTOPILOT, module, own, may_end=True)
-        return True
+        super().start()
 
-    def vehicle_course(self, listener: StatusListener) -> VehicleCourse:
-        """Return the course of the vehicle's nodes."""
-        return VehicleCourse(self._lab, self._flight, listener)
+    def announcement(self) -> Iterable[str]:
+        """Return where the devices are."""
+        where = f"{len(self.children.names)} processes in ROS domain {self.flight.ports.domain}"
+        return (f"{where}; devices in {devices_of(self.flight.folder)}",)
 
-    def starter(self) -> Starter:
-        """Return the person who starts the mission."""
-        return Starter(self._flight.guest, self._lists)
-
-    def say(self, text: str) -> None:
-        """Show one line."""
-        self._flight.observer.message(text)
-
-
-class RehearsalCourse(Course):
-    """That of the vehicle, with a laboratory that ends it and a person who starts it."""
-
-    def __init__(
-        self, rehearsal: _Rehearsal, children: Processes, listener: StatusListener
-    ) -> None:
-        super().__init__()
-        self._rehearsal, self._children = rehearsal, children
-        self._vehicle, self._starter = rehearsal.vehicle_course(listener), rehearsal.starter()
-        self._said, self._say_at = "", 0.0  # [s] time.monotonic()
-
-    def __enter__(self) -> Self:
-        self.enter_context(self._vehicle)
-        self.enter_context(self._starter)
-        return self
+    def begin(self) -> None:
+        """Let the person begin."""
+        super().begin()
+        self._starter = self.enter_context(Starter(self.flight.guest, self._lists))
 
     def goes_on(self) -> bool:
         """Return whether the laboratory and the vehicle's flight go on."""
-        starter, rehearsal = self._starter, self._rehearsal
-        vehicle = self._vehicle.goes_on()
-        rehearsal.started, rehearsal.refused = starter.started, starter.refused
+        starter = self._starter
+        vehicle = super().goes_on()
+        self.started, self.refused = starter.started, starter.refused
         now = time.monotonic()
         if starter.waits_for != self._said and not starter.started and now >= self._say_at:
             self._said, self._say_at = starter.waits_for, now + SAY_PERIOD
-            rehearsal.say(f"before the start: {self._said}")
+            self.flight.observer.message(f"before the start: {self._said}")
         # the starter decides in a thread of its own: what ends the rehearsal is what was stored
-        return vehicle and not rehearsal.refused and self._children.running(LABORATORY)
+        return vehicle and not self.refused and self.children.running(LABORATORY)
+
+
+def devices_of(folder: ResultFolder) -> Path:
+    """Return the folder of the emulated devices."""
+    return (folder.path / "devices").absolute()
 
 
 def fly(
-    lab: Lab,
-    settings: FlightSettings,
-    observer: Observer,
-    stop: StopRequest,
-    checklist: bool = True,
-) -> tuple[Path, Outcome, dict[str, Any] | None]:
-    """Rehearse; return result folder, outcome and metrics, None if nothing was recorded.
-
-    checklist: whether the lists are required and a person does them.
-
-    Raises ResultFolderError, PortError, LabError.
-    """
-    prepare(observer.message)
-    folder = ResultFolder.create(settings.scenario.name, "rehearsal", settings.out)
-    outcome = _rehearsed(lab, settings, folder, observer, stop, checklist)
-    return folder.path, outcome, conclude(settings, folder, outcome)
-
-
-def _rehearsed(
     given: Lab,
     settings: FlightSettings,
     folder: ResultFolder,
     observer: Observer,
     stop: StopRequest,
-    checklist: bool,
+    checklist: bool = True,
 ) -> Outcome:
-    """Rehearse, and record to `folder`; a failure or a requested stop keeps the recording."""
-    logs, devices = folder.path / LOGS, (folder.path / DEVICES).absolute()
+    """Rehearse, and record to `folder`; a failure or a requested stop keeps the recording.
+
+    checklist: whether the lists are required and a person does them. Raises PortError, LabError.
+    """
+    logs, devices = folder.path / LOGS, devices_of(folder)
     for each in (logs, devices):
         each.mkdir(exist_ok=True)
     with Reservation(None, own_autopilot=False) as reservation:
@@ -221,10 +178,10 @@ def _rehearsed(
         node_arguments.write(sections, settings, folder)
         publishers = vehicle_nodes.publishers(lab)
         flight = FlightRun(settings, folder, ports, observer, stop, publishers)
-        rehearsal = _Rehearsal(lab, flight, checklist)
-        failure = rehearsal.run(devices)
-    refused = rehearsal.refused
-    if failure is not None and not rehearsal.started and failure.name not in OWN:
+        course = RehearsalCourse(lab, flight, checklist)
+        failure = supervise.run(course)
+    refused = course.refused
+    if failure is not None and not course.started and failure.name not in OWN:
         refused = refused or str(failure)
     outcome = read_outcome(settings, folder, failure, refused, stop.raised)
     figures = device_figures.read(folder.log, logs)

@@ -15,16 +15,15 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import BUILTIN, ONLOOKERS
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
-from uam_lab.flights.observer import FlightStatus, Observer
+from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.flights.processes.processes import NodeFailed, Processes
+from uam_lab.flights.processes.processes import Processes
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import read_outcome
 from uam_lab.flights.ros.process_fault_injection import ProcessFaults
@@ -150,16 +149,17 @@ def fly(
         if wiring.COCKPIT in sections:
             port = sections[wiring.COCKPIT]["port"]
             observer.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
-        last: list[FlightStatus] = []
         publishers = node_arguments.publishers(settings)
-        flight = FlightRun(settings, folder, ports, observer, stop, publishers)
-        failure = _supervise(flight, last)
+        course = SimulatedCourse(FlightRun(settings, folder, ports, observer, stop, publishers))
+        failure = supervise.run(course)
         if failure is not None and failure.status == NOT_READY and not settings.foreign:
             # on an overloaded machine the middleware may fail to connect all nodes
             observer.message(f"{failure}; starting again")
             _put_aside(folder)
-            failure = _supervise(flight, last)
+            course = SimulatedCourse(course.flight)
+            failure = supervise.run(course)
     outcome = read_outcome(settings, folder, failure, stop.raised)
+    last = course.listener.newest if course.listener is not None else []
     if outcome.failure and failure is None and last and last[-1].time < 0.0:
         outcome.failure = f"no take-off ({outcome.failure}); autopilot {last[-1].autopilot}"
     return outcome
@@ -175,103 +175,83 @@ def _put_aside(folder: ResultFolder) -> None:
         file.rename(aside / file.name)
 
 
-def _supervise(flight: FlightRun, last: list[FlightStatus]) -> NodeFailed | None:
-    """Run the processes until the plant ends; return the failure.
-
-    last: receives the newest status of a flight without a failure.
-    """
-    failure, listener = supervise.run(
-        flight,
-        partial(_start, flight),
-        partial(_announcement, flight),
-        partial(SimulatedCourse, flight),
-    )
-    if failure is None and listener is not None:
-        last[:] = listener.newest
-    return failure
-
-
-def _start(flight: FlightRun, children: Processes) -> None:
-    settings, ports, arguments = flight.settings, flight.ports, flight.ros_arguments
-    for name, module in node_arguments.modules(settings).items():
-        children.start(
-            name,
-            module,
-            arguments + node_arguments.process_remappings(settings, name),
-            may_end=name == wiring.PLANT,
-            optional=name in ONLOOKERS,
-            again=supervise.RESTARTS if name in (*CONTROLLERS, wiring.WHOLE_BODY) else 0,
-            nodes=node_arguments.nodes_in(name, settings),
-            place=placing(settings, ports.instance, name),
-        )
-    module, own = node_arguments.autopilot(settings, flight.folder, ports)
-    if module:
-        place = placing(settings, ports.instance, AUTOPILOT)
-        children.start(AUTOPILOT, module, own, may_end=True, place=place)
-
-
-def _announcement(flight: FlightRun, children: Processes) -> Iterator[str]:
-    settings, ports = flight.settings, flight.ports
-    yield (
-        f"{len(children.names)} processes in ROS domain {ports.domain}, "
-        f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
-    )
-    if node_arguments.users_autopilot(settings):
-        yield (
-            "waiting for your autopilot; restart a PX4 that has served a flight: it does not "
-            "connect again (px4_sitl restarts it by itself)"
-        )
-    for name in settings.foreign:
-        own = settings.own_names.get(name, name)
-        yield f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}"
-    if not settings.auto_start and not settings.dry_run:
-        real = settings.link is not None and settings.link.real
-        why = ": a real autopilot arms by itself only with --arm" if real else ""
-        yield f"waiting for uam start{why}"
-
-
 class SimulatedCourse(Course):
     """A flight in simulation: it goes on until the plant ends; faults of processes are injected.
 
     In lockstep a process that stays stopped ends it, see `Waits`.
     """
 
-    def __init__(self, flight: FlightRun, children: Processes, listener: StatusListener) -> None:
-        super().__init__()
-        self._children, self._listener, self._stop = children, listener, flight.stop
-        self._faults = self.enter_context(_process_faults(flight, children, listener))
-        lockstep = flight.settings.clock == LOCKSTEP
-        self._waits = Waits(children, listener, flight.observer) if lockstep else None
+    def start(self) -> None:
+        """Start the nodes, and an autopilot that is not the user's."""
+        settings, ports, arguments = (
+            self.flight.settings,
+            self.flight.ports,
+            self.flight.ros_arguments,
+        )
+        for name, module in node_arguments.modules(settings).items():
+            self.children.start(
+                name,
+                module,
+                arguments + node_arguments.process_remappings(settings, name),
+                may_end=name == wiring.PLANT,
+                optional=name in ONLOOKERS,
+                again=supervise.RESTARTS if name in (*CONTROLLERS, wiring.WHOLE_BODY) else 0,
+                nodes=node_arguments.nodes_in(name, settings),
+                place=placing(settings, ports.instance, name),
+            )
+        module, own = node_arguments.autopilot(settings, self.flight.folder, ports)
+        if module:
+            place = placing(settings, ports.instance, AUTOPILOT)
+            self.children.start(AUTOPILOT, module, own, may_end=True, place=place)
+
+    def announcement(self) -> Iterator[str]:
+        """Yield the ports, and what is waited for."""
+        settings, ports = self.flight.settings, self.flight.ports
+        yield (
+            f"{len(self.children.names)} processes in ROS domain {ports.domain}, "
+            f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
+        )
+        if node_arguments.users_autopilot(settings):
+            yield (
+                "waiting for your autopilot; restart a PX4 that has served a flight: it does not "
+                "connect again (px4_sitl restarts it by itself)"
+            )
+        for name in settings.foreign:
+            own = settings.own_names.get(name, name)
+            yield f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}"
+        if not settings.auto_start and not settings.dry_run:
+            real = settings.link is not None and settings.link.real
+            why = ": a real autopilot arms by itself only with --arm" if real else ""
+            yield f"waiting for uam start{why}"
+
+    def begin(self) -> None:
+        """Prepare the faults, and in lockstep the waits."""
+        flight, lockstep = self.flight, self.flight.settings.clock == LOCKSTEP
+        planned, self._topic = flight.settings.faults.only(PROCESS), None
+        faults = ProcessFaults(self.children, planned, self._announce, lockstep=lockstep)
+        self._faults = self.enter_context(faults)
+        waits = Waits(self.children, self.listener, flight.observer) if lockstep else None
+        self._waits: Waits | None = waits
 
     def goes_on(self) -> bool:
         """Begin and end the due faults; return whether the plant runs and nobody stops it.
 
         Raises NodeFailed.
         """
-        injected, mission_time = self._stop.injected, self._listener.mission_time
-        while not injected.empty():
-            self._faults.add(injected.get(), mission_time or 0.0)
-        self._faults.update(mission_time, self._listener.phase)
+        stop, mission_time = self.flight.stop, self.listener.mission_time
+        while not stop.injected.empty():
+            self._faults.add(stop.injected.get(), mission_time or 0.0)
+        self._faults.update(mission_time, self.listener.phase)
         if self._waits is not None:
             self._waits.look()
-        return self._children.running(wiring.PLANT) and not self._stop.raised
+        return self.children.running(wiring.PLANT) and not stop.raised
 
-
-def _process_faults(
-    flight: FlightRun, children: Processes, listener: StatusListener
-) -> ProcessFaults:
-    """Return the process faults; their start and end are printed and recorded."""
-    settings, schedule = flight.settings, flight.settings.faults.only(PROCESS)
-    topics: list[FaultTopic] = []  # made with the first fault
-
-    def announce(one: FaultState) -> None:
+    def _announce(self, one: FaultState) -> None:
+        """Print and record the start or end of a fault."""
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
         node = one.fault.values["node"]
-        process = children.process_of(node)
+        process = self.children.process_of(node)
         affected = node if process == node else f"{node}, hence of the process {process},"
-        flight.observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
-        if not topics:
-            topics.append(FaultTopic(listener.node))
-        topics[0].publish(listener.stamp, [one])
-
-    return ProcessFaults(children, schedule, announce, lockstep=settings.clock == LOCKSTEP)
+        self.flight.observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
+        self._topic = self._topic or FaultTopic(self.listener.node)  # made with the first fault
+        self._topic.publish(self.listener.stamp, [one])

@@ -5,7 +5,7 @@ Its status comes by two topics, twice a second.
 
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
@@ -161,14 +161,6 @@ class RestartTopic:
         self._diagnostics.publish(diagnostic(stamp, self._prefix + node, WARN, text, {}))
 
 
-class Course(ExitStack):
-    """What a kind of flight does besides: a context manager, polled while the flight goes on."""
-
-    def goes_on(self) -> bool:
-        """Do what is due; return whether the flight goes on."""
-        raise NotImplementedError
-
-
 def prepare(modules: Iterable[str], observer: Observer) -> None:
     """Begin to import the modules of the processes, unless `uam` has begun to; wait for the end of
     a killed flight's nodes. Raises ConfigurationError without room for shared memory."""
@@ -194,6 +186,12 @@ class FlightRun(NamedTuple):
         return environment(self.ports.domain, self.folder.path / "logs")
 
     @property
+    def graph(self) -> tuple[dict[str, str], int, str, list[str]]:
+        """What a further node in the flight's graph has, see `Guest`."""
+        common = node_arguments.common_remappings(self.settings)
+        return self.surroundings, self.ports.domain, self.settings.namespace, common
+
+    @property
     def ros_arguments(self) -> list[str]:
         """The ROS arguments that every node has."""
         # the nodes' output already contains their log messages; separate files would repeat them
@@ -201,63 +199,85 @@ class FlightRun(NamedTuple):
             *(
                 "--ros-args",
                 "--disable-external-lib-logs",
+                "-r",
+                f"__ns:={self.settings.namespace}",
+            ),
+            *(
                 "-p",
                 f"{PUBLISHERS}:={self.publishers}",
+                "--params-file",
+                str(self.folder.parameters),
             ),
-            *("--params-file", str(self.folder.parameters), "-r"),
-            f"__ns:={self.settings.namespace}",
         ]
 
     def guest(self, name: str) -> Guest:
         """Return a further node in the flight's graph, for `with`."""
-        common = node_arguments.common_remappings(self.settings)
-        return Guest(name, self.surroundings, self.ports.domain, self.settings.namespace, common)
+        return Guest(name, *self.graph)
 
 
-def run(
-    flight: FlightRun,
-    start: Callable[[Processes], None],
-    announce: Callable[[Processes], Iterable[str]],
-    course: Callable[[Processes, StatusListener], Course],
-) -> tuple[NodeFailed | None, StatusListener | None]:
-    """Start all processes, watch them while the course goes on, stop them.
+class Course(ExitStack):
+    """A kind of flight: its processes, and what it does while they run. A context manager.
 
-    start: starts them; announce: returns lines about the start; course: see `Course`. Returns the
-    failure, if any, and the listener with the newest status.
+    children: its processes, listener: its status, from their start on.
     """
-    settings, folder, ports, observer, stop, publishers = flight
-    common, listener = node_arguments.common_remappings(settings), None
-    with Processes(folder.path / "logs", flight.surroundings) as children:
+
+    children: Processes
+    listener: StatusListener | None = None
+
+    def __init__(self, flight: FlightRun) -> None:
+        super().__init__()
+        self.flight = flight
+
+    def start(self) -> None:
+        """Start the processes."""
+        raise NotImplementedError
+
+    def announcement(self) -> Iterable[str]:
+        """Return lines about the start."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Prepare what needs the listener; what has to be left again is entered here."""
+
+    def goes_on(self) -> bool:
+        """Do what is due; return whether the flight goes on."""
+        raise NotImplementedError
+
+
+def run(course: Course) -> NodeFailed | None:
+    """Start all processes of a flight, watch them while its course goes on, stop them.
+
+    Returns the failure, if any.
+    """
+    flight = course.flight
+    observer, stop = flight.observer, flight.stop
+    with Processes(flight.folder.path / "logs", flight.surroundings) as children:
         children.hurry = lambda: stop.impatient
+        course.children = children
         try:
-            start(children)
-            for line in announce(children):
+            course.start()
+            for line in course.announcement():
                 observer.message(line)
-            if settings.fused:
-                observer.message(node_arguments.fused_line(settings))
-            observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
-            graph = flight.surroundings, ports.domain, settings.namespace, common
-            with (
-                StatusListener(*graph, publishers) as listener,
-                course(children, listener) as running,
-            ):
-                observer.started(ports.domain)
-                _watch(children, listener, flight, running)
+            if flight.settings.fused:
+                observer.message(node_arguments.fused_line(flight.settings))
+            observer.message(f"for ros2 in another shell:\n{export_line(flight.ports.domain)}")
+            with StatusListener(*flight.graph, flight.publishers) as course.listener, course:
+                course.begin()
+                observer.started(flight.ports.domain)
+                _watch(course)
         except NodeFailed as failure:
-            return failure, listener
+            return failure
         finally:
             others = [name for name in children.names if name != wiring.RECORDER]
             disobedient = children.stop(others) + children.stop([wiring.RECORDER])
             if disobedient and not stop.impatient:
                 observer.message(f"did not stop and were killed: {', '.join(disobedient)}")
-    return None, listener
+    return None
 
 
-def _watch(
-    children: Processes, listener: StatusListener, flight: FlightRun, course: Course
-) -> None:
+def _watch(course: Course) -> None:
     """Show the progress while the flight goes on. Raises NodeFailed."""
-    observer = flight.observer
+    observer, children, listener = course.flight.observer, course.children, course.listener
     restarts = RestartTopic(listener.node)
     changed = ChangedParameters(listener.node, listener.door)
     while course.goes_on():
@@ -273,5 +293,5 @@ def _watch(
             observer.update(status)
         time.sleep(POLL)
     observer.finish()
-    if not flight.stop.raised:
+    if not course.flight.stop.raised:
         children.check()

@@ -8,7 +8,7 @@ command land; a second one ends the nodes at once, and the autopilot's own fails
 
 import shutil
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_control.supervision import State
@@ -18,10 +18,9 @@ from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.observer import Observer
 from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.interrupts import StopRequest
-from uam_lab.flights.processes.processes import Processes
 from uam_lab.flights.ros import node_arguments, supervise
 from uam_lab.flights.ros.logged_outcome import read_outcome
-from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
+from uam_lab.flights.ros.supervise import Course, FlightRun
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Lab
@@ -32,7 +31,7 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.namespace import prefix
 from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.wiring import Connections
-from uam_sim_bridge.ports import Ports, Reservation
+from uam_sim_bridge.ports import Reservation
 
 LAB_COPY = "lab.yaml"
 AGAIN = (
@@ -50,27 +49,52 @@ NONE_CONNECTED: dict[str, int] = {}  # of the plant, which a vehicle has not
 
 
 class VehicleCourse(Course):
-    """The course of a vehicle's nodes: its devices, their connections, a landing by command."""
+    """The course of a vehicle's nodes: its devices, their connections, a landing by command.
 
-    def __init__(self, lab: Lab, flight: FlightRun, listener: StatusListener) -> None:
-        super().__init__()
-        self._lab, self._listener, self._guest = lab, listener, flight.guest
-        self._observer, self._stop = flight.observer, flight.stop
-        node = listener.node
-        self._diagnostics = listen(node, topics.DIAGNOSTICS)
-        self._connections = Connections(node, spun=False)
-        self._prefix = prefix(node.get_namespace())
+    without: nodes that are not started; optional: the flight continues without these.
+    """
+
+    without: Collection[str] = ()
+    optional: Collection[str] = OPTIONAL
+
+    def __init__(self, lab: Lab, flight: FlightRun) -> None:
+        super().__init__(flight)
+        self.lab, self._observer, self._stop = lab, flight.observer, flight.stop
         self._reports: dict[str, Report] = {}
         self._devices, self._wires = devices(lab), vehicle_nodes.wires(lab)
         self._look_at = self._said_at = 0.0  # [s] time.monotonic()
         self._connected = self._landing = False
         self._done_at: float | None = None
 
+    def start(self) -> None:
+        """Start the nodes; their parameters are in the flight's folder."""
+        arguments, settings = self.flight.ros_arguments, self.flight.settings
+        for name, module in vehicle_nodes.processes(self.lab).items():
+            if name in self.without:
+                continue
+            again = supervise.RESTARTS if name in AGAIN else 0
+            nodes = node_arguments.nodes_in(name, settings)
+            how = {"optional": name in self.optional, "again": again, "nodes": nodes}
+            self.children.start(name, module, arguments, **how)
+
+    def announcement(self) -> Iterable[str]:
+        """Return how to fly."""
+        where = f"{len(self.children.names)} processes in ROS domain {self.flight.ports.domain}"
+        to_fly = "to fly: uam checklist, then uam start; or both in the cockpit"
+        return f"{where}; nothing arms by itself", to_fly
+
+    def begin(self) -> None:
+        """Listen to the diagnostics."""
+        node = self.listener.node
+        self._diagnostics = listen(node, topics.DIAGNOSTICS)
+        self._connections = Connections(node, spun=False)
+        self._prefix = prefix(node.get_namespace())
+
     def goes_on(self) -> bool:
         """Look at devices and nodes; return whether the flight goes on."""
         now = time.monotonic()
         self._look(now)
-        newest = self._listener.newest[-1] if self._listener.newest else None
+        newest = self.listener.newest[-1] if self.listener.newest else None
         if newest is not None and newest.done and self._done_at is None:
             self._done_at = now
         if self._done_at is not None:
@@ -85,7 +109,7 @@ class VehicleCourse(Course):
 
     def _look(self, now: float) -> None:
         """Take the diagnostics; every LOOK_PERIOD report the devices."""
-        for message in self._listener.door.messages(self._diagnostics):
+        for message in self.listener.door.messages(self._diagnostics):
             self._connections.note(message)
             for status in message.status:
                 name = status.name.removeprefix(self._prefix)
@@ -100,7 +124,7 @@ class VehicleCourse(Course):
         """Report once that all nodes are connected, and now and then which are not."""
         if self._connected:
             return
-        node = self._listener.node
+        node = self.listener.node
         waiting = wiring.missing(node, True, self._wires) or list(
             wiring.unconnected(
                 self._connections,
@@ -128,7 +152,7 @@ class VehicleCourse(Course):
         self._landing = True
         self._observer.message("in the air: command land; once more: ends the nodes at once")
         try:
-            with self._guest("uam_landing") as guest:
+            with self.flight.guest("uam_landing") as guest:
                 _, answer = Operator(guest.node).command("land")
         except NoFlight as error:
             answer = str(error)
@@ -157,43 +181,11 @@ def fly(
         node_arguments.write(sections, settings, folder)
         page = sections[wiring.COCKPIT]
         observer.message(f"cockpit: {page_address.address(page['host'], page['port'])}")
-        ports, publishers = reservation.ports, vehicle_nodes.publishers(lab)
-        flight = FlightRun(settings, folder, ports, observer, stop, publishers)
-        failure, _ = supervise.run(
-            flight,
-            lambda children: start_nodes(children, lab, flight),
-            lambda children: _announcement(children, ports),
-            lambda _, listener: VehicleCourse(lab, flight, listener),
-        )
+        publishers = vehicle_nodes.publishers(lab)
+        flight = FlightRun(settings, folder, reservation.ports, observer, stop, publishers)
+        failure = supervise.run(VehicleCourse(lab, flight))
     outcome = read_outcome(settings, folder, failure, stop.raised)
     if outcome.series is None and failure is None and stop.raised:
         outcome.failure = ""
         outcome.notes.append(NOTHING_FLOWN)
     return outcome
-
-
-def start_nodes(
-    children: Processes,
-    lab: Lab,
-    flight: FlightRun,
-    without: Collection[str] = (),
-    optional: Collection[str] = OPTIONAL,
-) -> None:
-    """Start the nodes of a vehicle except `without`; their parameters are in the flight's folder.
-
-    optional: the flight continues without these.
-    """
-    for name, module in vehicle_nodes.processes(lab).items():
-        if name in without:
-            continue
-        again = supervise.RESTARTS if name in AGAIN else 0
-        how = {
-            "optional": name in optional,
-            "nodes": node_arguments.nodes_in(name, flight.settings),
-        }
-        children.start(name, module, flight.ros_arguments, again=again, **how)
-
-
-def _announcement(children: Processes, ports: Ports) -> Iterator[str]:
-    yield f"{len(children.names)} processes in ROS domain {ports.domain}; nothing arms by itself"
-    yield "to fly: uam checklist, then uam start; or both in the cockpit"
