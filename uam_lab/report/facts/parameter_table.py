@@ -1,6 +1,6 @@
 """The flown parameters beside the paper's Table I, active safeguards, and changes in flight."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -149,17 +149,24 @@ def rows(info: Mapping[str, Any]) -> list[ChangeRow]:
     ]
 
 
+def together(marks: Iterable[tuple[float, Any]], apart: float) -> list[tuple[float, list[Any]]]:
+    """Return (time [s], items) of marks in order, (time, item); those closer than `apart` [s] share
+    a time."""
+    groups: list[tuple[float, list[Any]]] = []
+    for time, item in marks:
+        if groups and time - groups[-1][0] < apart:
+            groups[-1][1].append(item)
+        else:
+            groups.append((time, [item]))
+    return groups
+
+
 def labels(shown: Sequence[ChangeRow], apart: float) -> list[tuple[float, str]]:
     """Return (time, text) of the labels; requests closer than `apart` [s] share one label."""
-    groups: list[list[ChangeRow]] = []
-    for row in shown:
-        if groups and row.time - groups[-1][0].time < apart:
-            groups[-1].append(row)
-        else:
-            groups.append([row])
+    groups = together([(row.time, row.number) for row in shown], apart)
     if len(groups) > LABELS:
         return []
-    return [(group[0].time, _span(group[0].number, group[-1].number)) for group in groups]
+    return [(time, _span(numbers[0], numbers[-1])) for time, numbers in groups]
 
 
 def _span(first: int, last: int) -> str:

@@ -1,13 +1,13 @@
 """Injected faults of a flight: shaded in the figures, listed on the page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.lines import Line2D
 
-from uam_lab.report.facts.parameter_table import text
+from uam_lab.report.facts.parameter_table import text, together
 from uam_lab.report.figures import style
 
 APART = 0.02  # of the time axis; closer letters share one place
@@ -54,9 +54,10 @@ def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -
         for axis in axes.flat:
             axis.axvspan(begin, over, color=style.FAULT, alpha=SHADE, linewidth=0.0, zorder=0.5)
             axis.axvline(begin, color=style.FAULT, linewidth=0.8, zorder=2.3)
+    marks = sorted((max(row.begin, start), row.letter) for row in shown)
     for axis in axes[0]:
-        for at, letters in _together(shown, start, APART * (end - start)):
-            style.note(axis, letters, (at, 0.0), (2, 2), **LETTER)
+        for at, letters in together(marks, APART * (end - start)):
+            style.note(axis, " ".join(letters), (at, 0.0), (2, 2), **LETTER)
 
 
 def handles(info: Mapping[str, Any]) -> list[Line2D]:
@@ -64,15 +65,3 @@ def handles(info: Mapping[str, Any]) -> list[Line2D]:
     if not rows(info):
         return []
     return [style.key("fault", style.FAULT, 6.0, alpha=2.0 * SHADE)]
-
-
-def _together(shown: Sequence[FaultMark], start: float, apart: float) -> list[tuple[float, str]]:
-    """Return (time, letters); faults closer than `apart` [s] share one text."""
-    groups: list[tuple[float, list[str]]] = []
-    for row in sorted(shown, key=lambda row: row.begin):
-        at = max(row.begin, start)
-        if groups and at - groups[-1][0] < apart:
-            groups[-1][1].append(row.letter)
-        else:
-            groups.append((at, [row.letter]))
-    return [(at, " ".join(letters)) for at, letters in groups]

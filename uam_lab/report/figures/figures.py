@@ -6,17 +6,21 @@ its own function.
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from uam_control.coordinates import coordinates
 from uam_control.laws import catalogue
 from uam_control.laws.law import GainGroup
 from uam_lab.records.results import metrics
 from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.phase_errors import GROUPS
 from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
@@ -28,31 +32,40 @@ from uam_lab.report.figures.stability_figures import coupling, lyapunov
 from uam_lab.report.figures.zoomable import zoomable
 
 DEGREES = 180.0 / np.pi
-ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
+ANGLES = {"roll": "roll φ", "pitch": "pitch θ", "yaw": "yaw ψ"}  # in a label
 
 
-def position_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """Draw the position error over time, as in the paper's plot1."""
-    drawn = [Panel(f"{axis} error [m]", f"error.{axis}") for axis in "xyz"]
-    return _errors("Position tracking error", flights, drawn, "position_m", "m", 3)
-
-
-def attitude_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """Draw the attitude error over time, as in the paper's plot3."""
+def tracking_errors(group: int, flights: Sequence[DrawnFlight]) -> Figure:
+    """Draw the errors of one of GROUPS over time, as in the paper's plot1, plot3 and plot5; of a
+    single flight with its RMS and the paper's beside them."""
+    key, block, factor = GROUPS[group]
+    _, heading, unit, digits, labels = paper.tables(_joints(flights))[group]
     drawn = [
-        Panel(f"{label} error [°]", f"error.{name}", DEGREES)
-        for label, name in ((ROLL, "roll"), (PITCH, "pitch"), (YAW, "yaw"))
+        Panel(f"{ANGLES.get(label, label)} error [{unit}]", f"error.{name}", factor)
+        for label, name in zip(labels, coordinates(_joints(flights))[block], strict=True)
     ]
-    return _errors("Attitude tracking error", flights, drawn, "attitude_deg", "°", 2)
+    title, single = f"{heading.capitalize()} tracking error", len(flights) == 1
+    figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
+    if single:
+        own = metrics.errors(flights[0].series)[key]
+        for axis, value, published in zip(axes, own, paper.published(key, len(own)), strict=True):
+            _beside(axis, 0.74, "RMS")
+            text = f"{value:.{digits}f} {unit}".replace(" °", "°")
+            _beside(axis, 0.58, text, fontsize=10.5, color=style.INK)
+            if published is not None:
+                _beside(axis, 0.42, f"paper {published:g} {unit}".replace(" °", "°"))
+    for axis in axes:
+        axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
+    return figure
 
 
-def arm_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """Draw the joint error over time, as in the paper's plot5."""
-    drawn = [
-        Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
-        for joint, label in enumerate(paper.joint_labels(_joints(flights)), start=1)
-    ]
-    return _errors("Arm tracking error", flights, drawn, "arm_deg", "°", 2)
+def _beside(axis: Axes, height: float, text: str, **look: Any) -> None:
+    """Write a text beside a panel."""
+    look = {"fontsize": 7.5, "color": style.MUTED, "va": "center", **look}
+    axis.text(1.02, height, text, transform=axis.transAxes, **look)
+
+
+position_errors, attitude_errors, arm_errors = (partial(tracking_errors, k) for k in range(3))
 
 
 def _joints(flights: Sequence[DrawnFlight]) -> int:
@@ -172,44 +185,6 @@ def _adaptation_of(
                 linestyle=("-", "--", ":", "-.")[number % 4] if several and flights > 1 else "-",
                 linewidth=1.0,
             )
-
-
-def _compared(published: float | None, unit: str) -> str:
-    """Return the paper's figure, "" where it has none."""
-    return "" if published is None else f"paper {published:g} {unit}".replace(" °", "°")
-
-
-def _errors(
-    title: str,
-    flights: Sequence[DrawnFlight],
-    drawn: list[Panel],
-    group: str,
-    unit: str,
-    digits: int,
-) -> Figure:
-    """Draw error panels; for a single flight with its RMS and the paper's beside them."""
-    single = len(flights) == 1
-    figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
-    if single:
-        own = metrics.errors(flights[0].series)[group]
-        for axis, value, published in zip(axes, own, paper.published(group, len(own)), strict=True):
-            for text, height, size, colour in (
-                ("RMS", 0.74, 7.5, style.MUTED),
-                (f"{value:.{digits}f} {unit}".replace(" °", "°"), 0.58, 10.5, style.INK),
-                (_compared(published, unit), 0.42, 7.5, style.MUTED),
-            ):
-                axis.text(
-                    1.02,
-                    height,
-                    text,
-                    transform=axis.transAxes,
-                    fontsize=size,
-                    color=colour,
-                    va="center",
-                )
-    for axis in axes:
-        axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
-    return figure
 
 
 # file name → (figure, caption in the report), in the order of the page
