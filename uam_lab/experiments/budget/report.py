@@ -12,7 +12,7 @@ from uam_lab.experiments.budget.flown import Budget
 from uam_lab.experiments.budget.path import SEGMENTS
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
-from uam_lab.records.results.templates import markdown_table
+from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
 
 matplotlib.use("Agg")
@@ -46,7 +46,7 @@ def summary(budgets: Sequence[Budget]) -> str:
             markdown_table(
                 ("node", *names, "cores"),
                 (
-                    [node, *(f"{work[name]:.3f}" for name in names), _cores(one.cores.get(node), 3)]
+                    [node, *(f"{work[name]:.3f}" for name in names), shown(one.cores.get(node), 3)]
                     for node, work in one.work.items()
                 ),
             ),
@@ -62,13 +62,9 @@ def _totals(one: Budget) -> list[str]:
         one.layout,
         *(f"{value:.2f}" for value in one.figures.values()),
         missed if one.clock == "realtime" else "-",
-        _cores(one.control_cores if one.cores else None, 2),
+        shown(one.control_cores if one.cores else None, 2),
         f"{one.pace:.3f}",
     ]
-
-
-def _cores(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def document(budgets: Sequence[Budget], facts: dict[str, Any]) -> dict[str, Any]:

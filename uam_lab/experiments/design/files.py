@@ -1,6 +1,5 @@
 """The files of a design: profile, gains of the autopilot, pictures of its margins; its table."""
 
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.design.search import RATES, Design
 from uam_lab.experiments.margins import report
 from uam_lab.records.results.atomic import write_text
-from uam_lab.records.results.templates import markdown_table
+from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
 
 MADE = "# uam vehicle design"  # first words of a file that a later design may replace
@@ -79,14 +78,10 @@ def _rows(made: Design) -> Iterator[list[str]]:
             loop,
             f"{min(one.crossover for one in seen):.3g}",
             f"{min(abs(one.phase) for one in seen):.0f}",
-            _finite(min(min(one.gain, one.gain_down) for one in seen), 1),
-            _finite(1e3 * min(one.delay for one in seen), 0),
+            shown(min(min(one.gain, one.gain_down) for one in seen), 1),
+            shown(1e3 * min(one.delay for one in seen), 0),
             f"{max(one.peak for one in seen):.2f}",
             made.limits[loop],
         ]
     if RATES in made.limits:
         yield [RATES, "", "", "", "", "", made.limits[RATES]]
-
-
-def _finite(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"

@@ -22,7 +22,7 @@ from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results import phase_errors
-from uam_lab.records.results.templates import markdown_table
+from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
 from uam_sim_bridge.plant.effects import presets
@@ -260,7 +260,7 @@ def _picks(duel: Duel, results: Results, task: str) -> str:
         own = [r for r in _of(results, label, task) if r.done]
         cells = [_cell(duel, results, label, task, PICKED, k) for k in range(len(PICKED))]
         worst = [
-            _shown(max(map(value, own), default=np.nan), digits) for _, value, digits in LOADING
+            shown(max(map(value, own), default=np.nan), digits) for _, value, digits in LOADING
         ]
         rows.append([label, *cells, *worst])
     return markdown_table([task, *(head for head, *_ in (*PICKED, *LOADING))], rows)
@@ -273,11 +273,7 @@ def _cell(
     _, value, digits = measures[number]
     said = duel.published.get(label, {}).get(task)
     told = "" if said is None else f" ({said[number]:g})"
-    return _shown(mean(map(value, _of(results, label, task))), digits) + told
-
-
-def _shown(value: float, digits: int) -> str:
-    return "-" if np.isnan(value) else f"{value:.{digits}f}"
+    return shown(mean(map(value, _of(results, label, task))), digits) + told
 
 
 def _robust(duel: Duel, results: Results) -> str:
@@ -288,7 +284,7 @@ def _robust(duel: Duel, results: Results) -> str:
         joint = mean(r.joint for r in own)
         offset = MILLI * mean(r.standing for r in own)
         early, lost = sum(not r.done for r in own), sum(r.lost for r in own)
-        numbers = [_shown(joint, 2), _shown(offset, 1), survived(results, label)]
+        numbers = [shown(joint, 2), shown(offset, 1), survived(results, label)]
         rows.append([label, *numbers, f"{early} of {len(own)}", str(lost)])
     head = ["row", "worst joint, RMSE [deg]", "standing offset [mm]", "survived delay [ms]"]
     return markdown_table([*head, "ended early", "lost"], rows)

@@ -58,8 +58,8 @@ def write(
     lost_rows = [
         [
             " --fault ".join([again, *r.given.split()]),
-            _rounded(r.tilt_deg, 0),
-            _rounded(r.impact, 2),
+            templates.shown(r.tilt_deg, 0, ""),
+            templates.shown(r.impact, 2, ""),
             r.why,
         ]
         for r in lost
@@ -96,7 +96,7 @@ def _row(r: FaultResult) -> dict[str, object]:
         "outcome": r.outcome,
         **{key: _shown(worst(r, key)) for key in ERRORS},
         "duration_s": f"{r.duration_s:.2f}",
-        "down_after_s": _rounded(r.down_after_s, 2),
+        "down_after_s": templates.shown(r.down_after_s, 2, ""),
         "promise_kept": "" if r.kept is None else r.kept,
         "why": r.why,
         "given": r.given,
@@ -219,10 +219,6 @@ def _text(cells: Cells, row: str, moment: str) -> str:
 
 def _colour(cells: Cells, row: str, moment: str) -> tuple[float, float, float]:
     return to_rgb(COLOURS[cells[row, moment].outcome] if (row, moment) in cells else "white")
-
-
-def _rounded(value: float | None, digits: int) -> str:
-    return "" if value is None else f"{value:.{digits}f}"
 
 
 def _shown(value: float) -> str:

@@ -16,7 +16,7 @@ from uam_lab.experiments.margins.cases import Case, smallest_delay
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, GrowingMode, step_response
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
-from uam_lab.records.results.templates import markdown_table
+from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
 
 matplotlib.use("Agg")
@@ -44,12 +44,12 @@ def table(cases: Sequence[Case]) -> str:
 
 def _rows(found: Analysis) -> Iterator[list[str]]:
     for name, (_, m) in found.loops.items():
-        gain = f"{_text(m.gain, 1)} / -{_text(m.gain_down, 1)}"
-        row = [name, _text(m.crossover, 2), _text(m.bandwidth, 2), _text(m.phase, 1), gain]
-        yield [*row, _text(1e3 * m.delay, 1), _text(m.peak, 2)]
+        gain = f"{shown(m.gain, 1)} / -{shown(m.gain_down, 1)}"
+        row = [name, shown(m.crossover, 2), shown(m.bandwidth, 2), shown(m.phase, 1), gain]
+        yield [*row, shown(1e3 * m.delay, 1), shown(m.peak, 2)]
     for name, delay in (("all setpoints", found.setpoint_delay), ("hand", found.hand_delay)):
         if delay is not None:
-            yield [name, "", "", "", "", _text(1e3 * delay, 1), ""]
+            yield [name, "", "", "", "", shown(1e3 * delay, 1), ""]
 
 
 def document(cases: Sequence[Case], facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -88,12 +88,12 @@ def bode(cases: Sequence[Case]) -> Figure:
         size, phase = axes[:, column]
         for number, case in enumerate(cases):
             omega = case.analysis.omega
-            shown = (omega >= low) & (omega <= high)
+            within = (omega >= low) & (omega <= high)
             for i, name in enumerate(names):
-                loop = case.analysis.loops[name][0][shown]
+                loop = case.analysis.loops[name][0][within]
                 look = {"color": style.flight_colour(i), "linestyle": DASHES[number % len(DASHES)]}
-                size.semilogx(omega[shown], 20.0 * np.log10(np.abs(loop)), **look)
-                phase.semilogx(omega[shown], _phase(loop), **look)
+                size.semilogx(omega[within], 20.0 * np.log10(np.abs(loop)), **look)
+                phase.semilogx(omega[within], _phase(loop), **look)
         size.axhline(0.0, color=style.INK, linewidth=0.7)
         phase.axhline(-180.0, color=style.INK, linewidth=0.7)
         size.set_ylim(-40.0, 40.0)
@@ -154,7 +154,3 @@ def _mode(mode: GrowingMode) -> str:
     if mode.growth < GROWTH:
         return "stable"
     return f"UNSTABLE ({mode.growth:+.2g} 1/s at {mode.frequency:.3g} rad/s)"
-
-
-def _text(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"

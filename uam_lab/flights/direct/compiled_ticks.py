@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial, wraps
 from operator import is_
-from typing import Protocol
+from typing import Any
 from weakref import proxy
 
 import numpy as np
@@ -27,13 +27,12 @@ from uam_control.maths.compiled import borrowing, jit, on_disk
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import put
 from uam_control.stages.bridge_stage import BridgeStage, unreported
-from uam_control.stages.control_tick import ControlTick, take_report
+from uam_control.stages.control_tick import take_report
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.signals import GRIP, IMU, JOINTS, NOTHING, PAYLOAD, POSES, SignalArrays
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, MANY, Step, Steps
-from uam_lab.flights.direct.record import MOTORS, TickRecorder, record_step
-from uam_sim_bridge.autopilot.joined import JoinedAutopilot, cycle_step
-from uam_sim_bridge.plant import Plant
+from uam_lab.flights.direct.record import MOTORS, record_step
+from uam_sim_bridge.autopilot.joined import cycle_step
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.observation import sense, step
 from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, MocapArrays
@@ -41,33 +40,6 @@ from uam_sim_bridge.plant.sensors import PAYLOAD_POSE, VEHICLE_POSE, WAITING, Mo
 COMPILES = "compiling the direct engine for this law and vehicle (once)"
 LEAST = 2  # ticks for which the preparations are worth their time
 USUAL = {"mission": MissionStage, "bridge": BridgeStage}
-
-
-class Flight(Protocol):
-    """What the compiled ticks need of a `DirectFlight`; see there."""
-
-    plant: Plant
-    control: ControlTick
-    autopilot: JoinedAutopilot
-    autopilot_imu: bool
-    recorder: TickRecorder
-    say: Callable[[str], object]
-    newest: tuple[float, np.ndarray, np.ndarray]  # sample of the autopilot's IMU, see `Samples.hil`
-
-    def sense(self) -> None:
-        """Take the samples of a tick."""
-
-    def resume(self) -> None:
-        """Go on after compiled ticks that have sensed last."""
-
-    def go_on(self, stage: int) -> None:
-        """Finish a tick from a number in `ControlTick.stages` on."""
-
-    def cycle(self) -> None:
-        """Run the autopilot's cycle."""
-
-    def push(self) -> None:
-        """Advance the physics."""
 
 
 def _safely(method: Callable[..., int]) -> Callable[..., int]:
@@ -87,7 +59,8 @@ def _safely(method: Callable[..., int]) -> Callable[..., int]:
 class CompiledTicks:
     """Flies the compiled ticks of a flight; `ticks`: how many it has flown."""
 
-    def __init__(self, flight: Flight) -> None:
+    def __init__(self, flight: Any) -> None:
+        """flight: a `DirectFlight`, whose module imports this one."""
         self._flight, self.ticks = proxy(flight), 0  # the flight owns this object
         self._sample = np.zeros((2, 3))  # of the autopilot's IMU: gyro, specific force, FLU
         self._fault = np.zeros(1, dtype=np.int64)  # address of the text of MuJoCo's error

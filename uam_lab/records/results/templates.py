@@ -1,6 +1,7 @@
-"""HTML pages from templates, pictures as data URIs, Markdown tables."""
+"""HTML pages from templates, pictures as data URIs, Markdown tables and their numbers."""
 
 import base64
+import math
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
@@ -43,3 +44,9 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _cell(text: str) -> str:
     return visible(text).replace("|", "\\|")
+
+
+def shown(value: float | None, digits: int, without: str = "-") -> str:
+    """Return a number with so many digits; `without` for None, NaN and infinity."""
+    known = value is not None and math.isfinite(value)
+    return f"{value:.{digits}f}" if known else without
