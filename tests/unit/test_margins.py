@@ -23,7 +23,7 @@ from uam_lab.experiments.margins.linear import (
     margins,
 )
 from uam_lab.experiments.margins.loops import analyse, step_response
-from uam_lab.experiments.margins.plant_model import plant_model, rotor_model, zero_order_hold
+from uam_lab.experiments.margins.plant_model import plant_model, rotor_model
 from uam_lab.experiments.margins.pose_delay import pose_delay, remaining
 from uam_lab.experiments.margins.stack_model import stack_model
 from uam_sim_bridge.plant import Vehicle
@@ -113,12 +113,6 @@ def test_linearised_filter():
     np.testing.assert_allclose(block.c, [[2.0 * keep]], atol=1e-9)
     np.testing.assert_allclose(block.d, [[2.0 * (1.0 - keep)]], atol=1e-9)
     assert state[0] == 0.0
-
-
-def test_double_integrator_under_hold():
-    a, b = zero_order_hold(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.1)
-    np.testing.assert_allclose(a, [[1.0, 0.1], [0.0, 1.0]])
-    np.testing.assert_allclose(b, [[0.005], [0.1]])
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ import mujoco
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, POSITION
+from uam_control.maths.rotations import quaternion_from_euler
 from uam_lab.analysis import ticks
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
@@ -87,12 +88,7 @@ class Body:
         """
         qpos = self.data.qpos
         qpos[0:3] = chi[POSITION]
-        half = 0.5 * chi[ATTITUDE]
-        (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
-        qpos[3] = cr * cp * cy + sr * sp * sy
-        qpos[4] = sr * cp * cy - cr * sp * sy
-        qpos[5] = cr * sp * cy + sr * cp * sy
-        qpos[6] = cr * cp * sy - sr * sp * cy
+        qpos[3:7] = quaternion_from_euler(chi[ATTITUDE])
         qpos[7 : self.size + 1] = chi[ALPHA:]
         if self.pivot:
             qpos[self.size + 1] = self._hanging() if math.isnan(swing) else swing

@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.optimize import linear_sum_assignment
 
 TOGETHER = 100  # frequencies that are solved together
 STEP = 1e-6  # of inputs and states, for the central differences
@@ -269,12 +270,7 @@ def common_delay(omega: np.ndarray, loops: np.ndarray) -> float:
     # one frequency to the next: the eigenvalues in the order that moves them least
     for k in range(1, len(values)):
         distance = np.abs(values[k - 1][:, None] - values[k][None, :])
-        order = np.empty(len(values[k]), dtype=int)
-        for _ in range(len(order)):
-            i, j = np.unravel_index(np.argmin(distance), distance.shape)
-            order[i] = j
-            distance[i, :] = distance[:, j] = np.inf
-        values[k] = values[k][order]
+        values[k] = values[k][linear_sum_assignment(distance)[1]]
     found = [math.inf]
     for column in values.T:
         size, angle = np.log(np.maximum(np.abs(column), TINY)), np.unwrap(np.angle(column))

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from scipy.linalg import expm
+from scipy.signal import cont2discrete
 
 from uam_control.coordinates import ARM
+from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_lab.analysis.dynamics import Body
 from uam_lab.experiments.margins.linear import LinearBlock, delay, join
 from uam_sim_bridge.plant import Vehicle
@@ -62,7 +63,6 @@ def plant_model(
     given = np.zeros((size + rotors, rotors + joints))
     given[:size, rotors:] = b[:, rotors:]
     given[size:, :rotors] = slope / lag * np.eye(rotors)
-    held, stepped = zero_order_hold(whole, given, period)
     coordinates = len(names)
     seen = np.zeros((2 * coordinates, len(whole)))
     seen[:coordinates, :coordinates] = np.eye(coordinates)
@@ -70,8 +70,9 @@ def plant_model(
     motors = tuple(f"motor.{i + 1}" for i in range(rotors))
     acting, sent = (tuple(f"{one}.{j}" for j in names[ARM]) for one in ("acting", "effort"))
     outputs = (*(f"true.{name}" for name in names), *(f"true.{name}_dot" for name in names))
-    d = np.zeros((len(outputs), rotors + joints))
-    physics = LinearBlock(held, stepped, seen, d, (*motors, *acting), outputs)
+    none = np.zeros((len(outputs), rotors + joints))
+    held = cont2discrete((whole, given, seen, none), period)[:4]
+    physics = LinearBlock(*held, (*motors, *acting), outputs)
     bus = delay(sent, acting, numbers["servos"]["command_latency_ticks"])
     return join([physics, bus]), Hover(weight, command)
 
@@ -149,13 +150,7 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
             plant.step(np.full(count, command), output)
         return float(np.mean(output))
 
-    low, high = 0.0, 1.0
-    while high - low > 1e-9:
-        middle = 0.5 * (low + high)
-        factor = plant.constants[4]
-        curve = full * (factor * middle**2 + (1.0 - factor) * middle) * np.mean(plant.efficiency)
-        low, high = (middle, high) if curve < thrust else (low, middle)
-    command = low
+    command = inverse_curve(plant.constants[4], thrust / (full * np.mean(plant.efficiency)))
     slope = (settled(command + SINE) - settled(command - SINE)) / (2.0 * SINE)
     settled(command)
     cycle = round(2.0 * math.pi / (LAG_FREQUENCY * step))
@@ -168,10 +163,3 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
     # a sine without lag has the phase -90 degrees here
     behind = -(np.angle(total) + 0.5 * math.pi)
     return command, slope, math.tan(behind) / LAG_FREQUENCY
-
-
-def zero_order_hold(a: np.ndarray, b: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return A and B of the discrete system over `step` [s] with inputs that are constant in it."""
-    n, m = b.shape
-    whole = expm(step * np.block([[a, b], [np.zeros((m, n + m))]]))
-    return whole[:n, :n], whole[:n, n:]

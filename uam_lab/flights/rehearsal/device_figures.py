@@ -4,6 +4,7 @@ import socket
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
+from statistics import median_low
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -75,7 +76,7 @@ def values_of(messages: Iterable[DiagnosticArray]) -> dict[str, list[Mapping[str
 def of_reports(reports: Mapping[str, list[Mapping[str, str]]]) -> dict[str, float]:
     """Return the figures of the nodes' reports."""
     figures = {}
-    for chosen, reduce in ((MEDIANS, median), (LARGEST, max)):
+    for chosen, reduce in ((MEDIANS, median_low), (LARGEST, max)):
         for node, keys in chosen.items():
             for name, key in keys.items():
                 numbers = [finite(pairs.get(key)) for pairs in reports.get(node, ())]
@@ -130,11 +131,6 @@ def lines(figures: Mapping[str, Any]) -> list[str]:
     }
     found = {name: shown(*keys) for name, keys in groups.items()}
     return [f"{name:<10} {text}" for name, text in found.items() if text]
-
-
-def median(numbers: list[float]) -> float:
-    """Return the median; of an even number the lower of the two in the middle."""
-    return sorted(numbers)[(len(numbers) - 1) // 2]
 
 
 def free_udp_port() -> int:
