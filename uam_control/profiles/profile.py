@@ -15,7 +15,7 @@ from dataclasses import dataclass, make_dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -106,6 +106,14 @@ class Profile:
     def whole(self) -> bool:
         """Whether the controllers have a law of the whole body."""
         return all(catalogue.law(law).whole for law in self.laws().values())
+
+    def changed(self, name: str, changes: Mapping[str, Mapping[str, Any]]) -> Self:
+        """Return the profile `name` with other parameters, node → parameter → value.
+
+        Raises ProfileError.
+        """
+        own = {node: self.section(node) | values for node, values in changes.items()}
+        return profile_of(self.sections | own, Path(f"{name}.yaml"), self.vehicle)
 
 
 def servo_mode(profile: Profile) -> dict[str, str]:

@@ -6,7 +6,6 @@ must be equal bit for bit. Flight: the vehicle also flies with the changed set, 
 reported.
 """
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ATTITUDE
-from uam_control.profiles.profile import Profile, profile_of
+from uam_control.profiles.profile import Profile
 from uam_lab.experiments.compare.plan import Flights
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import timeseries
@@ -46,11 +45,10 @@ class Untouched:
 
 def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile:
     """Return the profile with one subsystem's feedback gains multiplied by `factor`."""
-    sections = copy.deepcopy(profile.sections)
-    section = sections[SUBSYSTEMS[subsystem][0]]
-    for name in ("lambda_1", "lambda_2"):
-        section[name] = [factor * value for value in section[name]]
-    return profile_of(sections, Path(f"{profile.name}_{subsystem}.yaml"), profile.vehicle)
+    node, _ = SUBSYSTEMS[subsystem]
+    section, names = profile.section(node), ("lambda_1", "lambda_2")
+    gains = {name: [factor * value for value in section[name]] for name in names}
+    return profile.changed(f"{profile.name}_{subsystem}", {node: gains})
 
 
 def trials(profile: Profile, flights: Flights, keep: Path) -> list[Trial]:

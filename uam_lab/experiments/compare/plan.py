@@ -1,13 +1,12 @@
 """The flights of a comparison."""
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profiles.profile import Profile, default_profile, load_profile, profile_of
+from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.trial import Trial
 from uam_lab.records.results.timeseries import SUBSYSTEMS
@@ -82,18 +81,15 @@ def entries(
 def frozen(profile: Profile, subsystems: Sequence[str] = SUBSYSTEMS) -> Profile:
     """Return the profile with constant gains: the adapted gains of these `subsystems` keep their
     initial values, theta_hat is zero."""
-    sections = copy.deepcopy(profile.sections)
-    for name in subsystems:
-        sections[f"{name}_controller"]["adapt"] = False
-    return profile_of(sections, Path(f"{profile.name}_frozen.yaml"), profile.vehicle)
+    adapt = {f"{name}_controller": {"adapt": False} for name in subsystems}
+    return profile.changed(f"{profile.name}_frozen", adapt)
 
 
 def with_weight(profile: Profile, other: Profile) -> Profile:
     """Return the profile with the gravity feedforward of `other`, without which it cannot lift."""
     name = "gravity_feedforward_mass"
-    sections = copy.deepcopy(profile.sections)
-    sections[POSITION][name] = getattr(other.sets[POSITION], name)
-    return profile_of(sections, Path(f"{profile.name}_weight.yaml"), profile.vehicle)
+    weight = {POSITION: {name: getattr(other.sets[POSITION], name)}}
+    return profile.changed(f"{profile.name}_weight", weight)
 
 
 def trials(rows: Mapping[str, Profile], flights: Flights, folder: Path) -> list[Trial]:

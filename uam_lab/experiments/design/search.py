@@ -258,9 +258,8 @@ class Search:
     def result(self, found: Found) -> Design:
         """Return the design; its profile has the delay margin of the cases."""
         least = min(case.analysis.setpoint_delay for case in found.cases)
-        own = {node: dict(values) for node, values in found.profile.sections.items()}
-        own["mission"]["delay_margin"] = min(1.0, math.floor(ROUND_DOWN * least) / ROUND_DOWN)
-        profile = profile_of(own, found.profile.file, found.described)
+        margin = min(1.0, math.floor(ROUND_DOWN * least) / ROUND_DOWN)
+        profile = found.profile.changed(found.profile.name, {"mission": {"delay_margin": margin}})
         return Design(found.described, profile, dict(self._limits), found.cases)
 
 

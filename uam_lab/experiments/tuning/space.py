@@ -1,14 +1,12 @@
 """Search space from a file of config/tuning: parameters with ranges, flights, cost function."""
 
-import copy
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any, Self
 
 from uam_control.laws import catalogue
-from uam_control.profiles.profile import NODES, Profile, default_profile, profile_of
+from uam_control.profiles.profile import NODES, Profile, default_profile
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
@@ -103,19 +101,20 @@ class Space:
 
     def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
         """Return the start profile with the knobs at `values` (by name). Raises ProfileError."""
-        sections = copy.deepcopy(self.start.sections)
+        changes: dict[str, dict[str, Any]] = {}
         for knob, node in [(k, node) for k in self.knobs for node in k.nodes]:
             value = float(f"{values[knob.name]:.{DIGITS}g}")
-            section = sections.setdefault(node, {})
+            section = changes.setdefault(node, {})
             if not knob.entries:
                 section[knob.parameter] = value
                 continue
-            vector = list(getattr(self.start.sets[node], knob.parameter))
-            vector = list(section.get(knob.parameter, vector))
+            vector = list(
+                section.get(knob.parameter) or getattr(self.start.sets[node], knob.parameter)
+            )
             for entry in knob.entries:
                 vector[entry] = value
             section[knob.parameter] = vector
-        return profile_of(sections, Path(f"{name}.yaml"), self.start.vehicle)
+        return self.start.changed(name, changes)
 
     def with_effects(self, effects: Effects) -> Self:
         """Return the space with these effects of the plant in every flight that has none."""
