@@ -302,7 +302,9 @@ def test_a_prediction_gives_roll_and_pitch_phase_and_leaves_yaw(vehicle):
 
 
 def test_an_unwritable_folder_is_refused_before_the_flight(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("uam_lab.experiments.margins.gains.fly", lambda *_: pytest.fail("flown"))
+    monkeypatch.setattr(
+        "uam_lab.experiments.trials.trial.recorded", lambda *_: pytest.fail("flown")
+    )
     (tmp_path / "file").touch()
     assert main(["margins", "--out", str(tmp_path / "file" / "out")]) == 2
     assert "cannot be written" in capsys.readouterr().err

@@ -15,8 +15,9 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 class Recording:
-    counts, lost, lost_by_publisher = {"/clock": 3}, {}, {}
+    lost, lost_by_publisher = {}, {}
     ended = "the log cannot be written: No space left on device"
+    log = SimpleNamespace(counts={"/clock": 3}, ended=ended)
 
     def close(self):
         raise FULL

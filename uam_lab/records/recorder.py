@@ -91,7 +91,7 @@ def _health(
     new: lines about messages refused since the last entry.
     """
     lost = sum(recording.lost.values())
-    summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
+    summary = recording.log.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, "lost of": _losses(recording)}
     values["recorded until [s]"] = recording.until / SECOND
     namespace = node.get_namespace()
@@ -99,8 +99,8 @@ def _health(
     values |= wiring.connection_counts(node, {}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     values |= recording.door.values()
-    level = ERROR if recording.ended else WARN if lost else OK
-    if new and not recording.ended:
+    level = ERROR if recording.log.ended else WARN if lost else OK
+    if new and not recording.log.ended:
         level, summary = ERROR, "; ".join(new)
     return diagnostic(now, label(node), level, summary, values)
 
@@ -152,7 +152,8 @@ def _complete(node: Node, recording: TopicRecorder, statistics: str) -> None:
     if recording.lost:
         log.warning(f"messages were lost: {_losses(recording)}")
     if statistics:
-        summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
+        lost, written = recording.lost, recording.log
+        summary = {"messages": written.counts, "lost": lost, "ended": written.ended}
         try:
             Path(statistics).write_text(json.dumps(summary, indent=1), encoding="utf-8")
         except OSError as error:
@@ -193,10 +194,10 @@ def _record(node: Node, stop: StopSignal) -> int:
             services.spin_once(timeout_sec=0.0)
         progress.tell(recording.until)
         if polls % polls_per_flush == 0:
-            recording.flush()
+            recording.log.flush()
             progress.repeat()
-            if recording.ended and not ended:
-                ended = recording.ended
+            if recording.log.ended and not ended:
+                ended = recording.log.ended
                 log.error(f"{ended}; recorded until {recording.until / SECOND:g} s")
             new: list[str] = []
             if time.monotonic() >= due:

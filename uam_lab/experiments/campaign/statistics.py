@@ -51,11 +51,6 @@ class Bin:
     completed: tuple[float, float, float]
     error: tuple[float, float, float]
 
-    @property
-    def middle(self) -> float:
-        """The middle of the bin."""
-        return 0.5 * (self.low + self.high)
-
 
 def sliced(values: np.ndarray, failed: np.ndarray, error: np.ndarray) -> list[Bin]:
     """Divide the flights by a value, into bins of (nearly) equal numbers of flights.

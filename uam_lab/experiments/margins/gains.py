@@ -4,21 +4,10 @@ import numpy as np
 
 from uam_control.laws import catalogue
 from uam_control.laws.modular import ZETA
-from uam_control.mission import load_scenario
 from uam_control.profiles.profile import Profile
-from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
-from uam_sim_bridge.plant import Vehicle
 
 PERCENTILE = 95.0
-
-
-def fly(profile: Profile, vehicle: Vehicle, scenario: str, payload_mass: float) -> Series:
-    """Return a flight of the direct engine, seed 1; payload_mass [kg]."""
-    loaded = load_scenario(scenario, vehicle.description)
-    flight = DirectFlight(loaded, profile, vehicle, payload_mass, seed=1)
-    flight.run()
-    return flight.recording.series({})
 
 
 def flown_gains(profile: Profile, series: Series) -> dict[str, np.ndarray]:

@@ -140,7 +140,7 @@ class CoreOffers:
 
 
 class TopicRecorder:
-    """The open file and its subscriptions."""
+    """The open file, `log`, and its subscriptions."""
 
     def __init__(
         self,
@@ -158,9 +158,9 @@ class TopicRecorder:
         for an existing file, OSError.
         """
         self._simulated, self._namespace = simulated, node.get_namespace()
-        self._writer = BoundedLog(file, size_limit)
+        self.log = BoundedLog(file, size_limit)
         for name, values in (metadata or {}).items():
-            self._writer.add_metadata(name, values)
+            self.log.add_metadata(name, values)
         self._bag: list[BagTopic] = []
         self.door = Door(node)
         self._node, self._rightful = node, rightful
@@ -182,7 +182,7 @@ class TopicRecorder:
         subscription = listen(node, topic, qos, raw=True)
         name = expanded(self._namespace, topic.name)
         self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
-        channel = add_topic(self._writer, self._bag[-1])
+        channel = add_topic(self.log, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
         # a foreign message would be a row of the table
         self.door.guard(subscription, topic.name, self._rightful, lambda: self._clock_sim != [])
@@ -221,7 +221,7 @@ class TopicRecorder:
         for number, (track, data, published, sequence, stamp) in enumerate(batch):
             offers.after(number)
             at = self._sim_time(published) if stamp is None else stamp
-            self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
+            self.log.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
         del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
         return len(batch)
 
@@ -261,15 +261,6 @@ class TopicRecorder:
         """time.monotonic() of the newest message of each topic with messages."""
         return {t.topic: t.arrived for t in self._tracks if t.arrived is not None}
 
-    def flush(self) -> None:
-        """Flush the written messages to the file."""
-        self._writer.flush()
-
-    @property
-    def ended(self) -> str:
-        """Reason of the end of the recording, "" while it runs."""
-        return self._writer.ended
-
     @property
     def until(self) -> int:
         """Simulation time [ns] of the newest /clock, 0 before the first."""
@@ -286,17 +277,12 @@ class TopicRecorder:
         lost = {track.topic: track.lost for track in self._tracks if track.lost}
         return {expanded(self._namespace, topic): counts for topic, counts in lost.items()}
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Messages written, per topic."""
-        return self._writer.counts
-
     def close(self) -> bool:
         """Complete the file and write metadata.yaml beside it, see `bag.write_metadata`.
 
         Raises OSError if metadata.yaml cannot be written.
         """
         lost = {topic: str(count) for topic, count in self.lost.items()}
-        self._writer.add_metadata("lost messages", lost)
-        self._writer.close()
-        return write_metadata(self._writer, self._bag)
+        self.log.add_metadata("lost messages", lost)
+        self.log.close()
+        return write_metadata(self.log, self._bag)
