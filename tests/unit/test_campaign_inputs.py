@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
-from types import SimpleNamespace
 
 import pytest
 
 from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
-from uam_lab.cli import faults
 from uam_lab.cli.campaign import usual_ranges
-from uam_lab.cli.command import given_profile
+from uam_lab.cli.command import again, given_profile
 from uam_lab.cli.parser import parsed
 from uam_lab.experiments.trials.carried import inputs
 
@@ -84,8 +82,9 @@ def test_a_later_profile_overrides_an_earlier_one(command):
 def test_the_command_that_flies_a_cell_again_has_each_option_once_per_value():
     words = ["faults", "--profile", "s500", "--profile", "hand", "--plant-preset", "laboratory"]
     options = parsed([*words, "--seed", "3", "--vehicle", "s500_arm"])
-    again = faults._again(options, SimpleNamespace(scenario="hover"))
-    assert again == (
+    where = {"engine": options.engine, "scenario": "hover"}
+    found = again("fly", options, **where, seed=options.seed, vehicle=options.vehicle)
+    assert found == (
         "uam fly --engine direct --scenario hover --seed 3 --vehicle s500_arm "
         "--profile s500 --profile hand --plant-preset laboratory"
     )

@@ -22,7 +22,6 @@ same seed gives the same flights on any number of workers; more --flights only a
 """
 
 import argparse
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,11 +30,11 @@ from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import (
     Command,
+    again,
     chosen_effects,
     count,
     given_profile,
     place_of,
-    repeated_words,
 )
 from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
 from uam_lab.flights.conclude import command_line
@@ -94,7 +93,9 @@ def run(options: argparse.Namespace) -> int:
 
     campaign = Experiment.of("campaign", out, rows, place, vehicle, options.scenario, given)
     results = campaign.fly(numbers, draws.__getitem__, describe)
-    say(report.write(out, results, vehicle.name, command_line(), _again(options)))
+    names = ("flights", "seed", "vehicle", "scenario", "ranges")
+    more = again("campaign", options, **{name: vars(options)[name] for name in names})
+    say(report.write(out, results, vehicle.name, command_line(), more))
     say(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
 
@@ -116,11 +117,3 @@ def _replay(trial: Trial, number: int, out: Path | None) -> int:
         command=command_line(),
     )
     return fly.fly(settings, video=True, report=True)
-
-
-def _again(options: argparse.Namespace) -> str:
-    """Return the command that flies flights of this campaign again."""
-    words = ["uam", "campaign", "--flights", str(options.flights), "--seed", str(options.seed)]
-    words += ["--vehicle", options.vehicle, "--scenario", options.scenario]
-    words += ["--ranges", options.ranges]
-    return shlex.join(words + repeated_words(options))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -246,14 +247,17 @@ def given_profile(names_or_files: Sequence[str], vehicle: VehicleDescription) ->
     return load_profile(*files, vehicle=vehicle)
 
 
-def repeated_words(options: argparse.Namespace) -> list[str]:
-    """Return the words that give --profile, --plant-preset and --effect again."""
+def again(command: str, options: argparse.Namespace, **named: object) -> str:
+    """Return a command of `uam` with the options `named`, as far as they are given, and with
+    --profile, --plant-preset and --effect as here."""
     given = {
+        **{f"--{name}": [str(value)] for name, value in named.items() if value is not None},
         "--profile": options.profile,
         "--plant-preset": options.plant_preset,
         "--effect": options.effects,
     }
-    return [word for flag, values in given.items() for one in values for word in (flag, one)]
+    words = [word for flag, values in given.items() for one in values for word in (flag, one)]
+    return shlex.join(["uam", command, *words])
 
 
 def chosen_effects(options: argparse.Namespace) -> Effects:

@@ -22,7 +22,6 @@ faults. Exit status: 0 all promises of the matrix kept, 1 a promise broken, 2 wr
 from __future__ import annotations
 
 import argparse
-import shlex
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -32,12 +31,12 @@ from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.cli.command import (
     Command,
+    again,
     chosen_effects,
     count,
     given_profile,
     place_of,
     refuse_given,
-    repeated_words,
 )
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import CLOCKS, ENGINES, check_clock
@@ -50,7 +49,6 @@ from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
 
 if TYPE_CHECKING:
-    from uam_lab.experiments.faults.matrix import Matrix
     from uam_lab.experiments.faults.trial import FaultResult
 
 BROKEN = 1
@@ -135,8 +133,9 @@ def run(options: argparse.Namespace) -> int:
     experiment = Experiment.of(kind, out, ROWS, place, vehicle, matrix.scenario, of, measure)
     trials = [flight(label=cell.fault, faults=cell.schedule, cell=cell) for cell in cells]
     results = experiment.fly_all(trials, _about)
-    again = _again(options, matrix)
-    summary, page = report.write(out, matrix, results, vehicle.name, command_line(), again)
+    where = {"engine": options.engine, "scenario": matrix.scenario}
+    one = again("fly", options, **where, seed=options.seed, vehicle=options.vehicle)
+    summary, page = report.write(out, matrix, results, vehicle.name, command_line(), one)
     say(summary)
     say(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0
@@ -145,15 +144,3 @@ def run(options: argparse.Namespace) -> int:
 def _about(one: FaultResult) -> str:
     moment = f", {one.moment}" if one.moment else ""
     return f"{one.fault}{moment}: {one.outcome}"
-
-
-def _again(options: argparse.Namespace, matrix: Matrix) -> str:
-    """Return the command that repeats a flight, without its faults."""
-    named = {
-        "engine": options.engine,
-        "scenario": matrix.scenario,
-        "seed": options.seed,
-        "vehicle": options.vehicle,
-    }
-    chosen = [f"--{name} {value}" for name, value in named.items() if value is not None]
-    return " ".join(["uam fly", *chosen, *map(shlex.quote, repeated_words(options))])

@@ -268,11 +268,8 @@ def process_remappings(settings: FlightSettings, process: str) -> list[str]:
 
 def remappings(settings: FlightSettings, node: str) -> list[str]:
     """Return the ROS arguments with the remappings of a node; those of its own come first."""
-    names = settings.remappings.get(node, {}) | {
-        old: new
-        for old, new in settings.remappings.get(EVERY_NODE, {}).items()
-        if old not in settings.remappings.get(node, {})
-    }
+    own = settings.remappings.get(node, {})
+    names = {**own, **settings.remappings.get(EVERY_NODE, {}), **own}
     return [word for old, new in names.items() for word in ("-r", f"{old}:={new}")]
 
 

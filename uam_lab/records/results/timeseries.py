@@ -117,15 +117,11 @@ class Columns:
         return f"{name} [{self.units[name]}]"
 
 
+@cache
 def columns(joints: int, rotors: int, hand: bool = False, fingers: bool = False) -> Columns:
     """Return the columns of a vehicle with so many joints and rotors; hand: an end effector;
     fingers: a two-finger gripper."""
-    return _made(joints, rotors, hand, fingers)
-
-
-@cache
-def _made(*vehicle: int) -> Columns:
-    return Columns(_declare(*vehicle))
+    return Columns(_declare(joints, rotors, hand, fingers))
 
 
 def columns_of(vehicle: VehicleDescription) -> Columns:
