@@ -90,7 +90,7 @@ def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys, mo
     assert f"{completed} of {FLIGHTS} flights completed" in capsys.readouterr().out
     rows = list(csv.DictReader((out / "flights.csv").open()))
     assert len(rows) == FLIGHTS
-    assert all(np.isfinite(float(row["rms x"])) for row in rows)
+    assert all(np.isfinite(float(row["rms.x"])) for row in rows)
     assert (out / "campaign.png").stat().st_size > 0
 
     page = (out / "report.html").read_text()

@@ -93,6 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
     campaign = Experiment.of("campaign", out, rows, place, vehicle, options.scenario, given)
     results = campaign.fly(numbers, draws.__getitem__, describe)
+    campaign.write_csv()
     names = ("flights", "seed", "vehicle", "scenario", "ranges")
     more = again("campaign", options, **{name: vars(options)[name] for name in names})
     say(report.write(out, results, vehicle.name, command_line(), more))

@@ -89,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
     table = result_rows(len(vehicle.joints))
     comparison = Experiment.of("compare", out, table, place, vehicle, scenario, of)
     results = comparison.fly_all(every, _about)
+    comparison.write_csv()
     results, others = results[: len(trials)], results[len(trials) :]
     modular = modularity.ModularityEvidence.of(proposed, kept, others)
     facts = {

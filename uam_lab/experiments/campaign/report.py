@@ -18,7 +18,7 @@ from uam_lab.experiments.campaign.variations import common
 from uam_lab.experiments.trials.outcome import COMPLETED, OUTCOMES, counts
 from uam_lab.experiments.trials.trial import TrialResult
 from uam_lab.records.results import templates
-from uam_lab.records.results.atomic import write_rows, write_text
+from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import versions, write_json
 from uam_lab.report.figures import style
 
@@ -130,27 +130,13 @@ def _errors(axis: Axes, bins: list[Bin], values: np.ndarray, flights: Flown) -> 
 def write(
     out: Path, results: Mapping[int, TrialResult], vehicle: str, command: str, again: str
 ) -> str:
-    """Write flights.csv, campaign.json, campaign.png, summary.md and report.html; return summary.
+    """Write campaign.json, campaign.png, summary.md and report.html; return summary.
 
     results: by the flight's number; vehicle: its name; again: command that flies one flight again,
     to which `--draws NUMBER --replay` is added.
     """
     flights = Flown(results)
     shared = common(flights.drawn, flights.failed)
-    write_rows(
-        out / "flights.csv",
-        ["flight", *flights.drawn, *(f"rms {n}" for n in flights.names), "outcome", "why"],
-        (
-            [
-                number,
-                *(f"{column[row]:.4g}" for column in flights.drawn.values()),
-                *(f"{x:.4g}" for x in flights.rms[row]),
-                flights.outcome[row],
-                flights.why[row],
-            ]
-            for row, number in enumerate(flights.numbers)
-        ),
-    )
     slices = {n: sliced(v, flights.failed, flights.error) for n, v in flights.drawn.items()}
     worst = [_listed(flights, row, again) for row in flights.worst(WORST)]
     percentiles = {str(p): [percentile(c, p) for c in flights.rms.T] for p in PERCENTILES}

@@ -12,7 +12,7 @@ from uam_lab.experiments.compare import plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import templates, timeseries
-from uam_lab.records.results.atomic import write_rows, write_text
+from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import versions, write_json
 from uam_lab.report.figures import figures, style
 from uam_lab.report.figures.panels import DrawnFlight
@@ -25,7 +25,6 @@ PAPERS_FIGURES = (
     "vehicle_inputs",
     "arm_inputs",
 )
-HEAD = ("controller", "payload_kg", "seed", "outcome", "place_error_m", "why")
 OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 
@@ -52,7 +51,7 @@ def write(
     modular: ModularityEvidence,
     facts: Mapping[str, Any],
 ) -> tuple[str, Path]:
-    """Write flights.csv, comparison.json, tables.md, figures/ and report.html to `out`.
+    """Write comparison.json, tables.md, figures/ and report.html to `out`.
 
     Returns a text for the console, and the page.
     """
@@ -61,18 +60,6 @@ def write(
     markdown = tables.as_markdown(found)
     for table in modular.tables():
         markdown += f"\n{templates.markdown_table(*table)}\n"
-    write_rows(
-        out / "flights.csv",
-        [*HEAD[:3], *(f"rms {n}" for n in found[0].coordinates), *HEAD[3:]],
-        (
-            [
-                *(r.label, r.payload_mass, r.seed),
-                *(f"{x:.6g}" for x in r.rms),
-                *(r.outcome, "" if r.place_error is None else f"{r.place_error:.4f}", r.why),
-            ]
-            for r in results
-        ),
-    )
     numbers = {
         row.label: {
             name: value for name, value in vars(row).items() if name not in ("label", "why")

@@ -11,6 +11,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, Self
 
+import pyarrow.parquet as pq
+from pyarrow.csv import write_csv
+
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.carried import arrived, carried, inputs
 from uam_lab.experiments.trials.counting import Counting
@@ -55,6 +58,11 @@ class Experiment:
         """Return an experiment with its table in the folder `out`; given: see `carried.inputs`."""
         of = inputs(vehicle, scenario, given)
         return cls(name, out / "flights.parquet", rows, of, place, work)
+
+    def write_csv(self) -> None:
+        """Write the table beside itself as CSV, for a spreadsheet."""
+        with replacing(self.table.with_suffix(".csv")) as temporary:
+            write_csv(pq.read_table(self.table), temporary)
 
     def fly_all(self, trials: Sequence[Any], describe: Callable[[Any], str]) -> list[Any]:
         """Fly these trials, by their numbers, as `fly`; return the results in their order."""
