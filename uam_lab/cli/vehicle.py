@@ -22,7 +22,6 @@ import dataclasses
 import getpass
 import shlex
 import sys
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 
@@ -33,7 +32,7 @@ from uam_lab.cli.fly import fly, missed_margins
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
-from uam_lab.records.results.result_folder import in_a_name, new_folder
+from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 UNIT = "systemd/uam-vehicle.service"
@@ -66,10 +65,7 @@ def run(options: argparse.Namespace) -> int:
     missed = missed_margins(settings)
     if missed and not options.dry_run:
         raise SettingsError(f"{missed[0]}: uam vehicle design, or another profile in the lab file")
-    out = options.out
-    if out is None:
-        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-        out = new_folder(lab.out.expanduser(), f"{stamp}-{in_a_name(settings.scenario.name)}")
+    out = options.out or make_folder(None, settings.scenario.name, parent=lab.out.expanduser())
     settings = dataclasses.replace(settings, out=out, notes=settings.notes + missed)
     engine = partial(vehicle_engine.fly, lab)
     return fly(settings, video=False, report=options.report, engine=engine, name="vehicle")

@@ -107,17 +107,12 @@ TRANSIT = 0.8  # of the largest yaw rate
 def settings(scenario: str | Path | None = None, **given: Any) -> FlightSettings:
     """Return the settings of a flight with these options, see `FlightOptions`.
 
+    Scenario, profile and faults are loaded; it is checked that they can be flown together.
+
     Raises SettingsError, ConfigurationError, ScenarioError (InfeasibleReference too), ProfileError,
     Px4Error, PortError, PlantError, FaultError; each text is one line for the user.
     """
-    return checked(FlightOptions.of(scenario=scenario, **given))
-
-
-def checked(o: FlightOptions) -> FlightSettings:
-    """Load scenario, profile and faults of the options; check that they can be flown together.
-
-    Raises as `settings`.
-    """
+    o = FlightOptions.of(scenario=scenario, **given)
     without, own_names = _left_out(o.without)
     px4 = Px4Installation.find(o.px4_dir) if o.autopilot == PX4 else None
     px4_parameters.parse(o.px4_params, None if px4 is None else px4.ranges())

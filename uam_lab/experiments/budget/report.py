@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -14,8 +13,6 @@ from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
 from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
-
-matplotlib.use("Agg")
 
 # share of the ticks in each panel, and its title
 PANELS = ((1.0, "mean of all ticks"), (0.01, "mean of the slowest 1 %"))

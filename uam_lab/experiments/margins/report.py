@@ -6,7 +6,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,8 +17,6 @@ from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
 from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
-
-matplotlib.use("Agg")
 
 HEAD = ("loop", "crossover rad/s", "bandwidth Hz", "phase deg", "gain dB", "delay ms", "peak")
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import optuna
 import yaml
@@ -16,8 +15,6 @@ from uam_lab.experiments.tuning.search import DONE, evaluated_start
 from uam_lab.experiments.tuning.space import Space
 from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.report.figures import style
-
-matplotlib.use("Agg")
 
 
 def best_of(space: Space, study: optuna.Study) -> FrozenTrial:

@@ -29,25 +29,15 @@ class Commands:
         """domain, namespace: of the flight; arguments: of ROS, as remappings."""
         self._place, self._arguments = (domain, namespace), tuple(arguments)
         self._lock = threading.Lock()
-        self._guests: list[Guest] = []
-        self._operator: Operator | None = None
-        self._switch: ProfileSwitch | None = None
+        self._clients: dict[type, tuple[Guest, Any]] = {}
 
     def guest(self, name: str) -> Guest:
         """Return a new node in the flight's graph; the caller closes it."""
         return Guest(name, transport_environment(), *self._place, self._arguments)
 
-    def _own(self, name: str) -> Any:
-        guest = self.guest(name)
-        self._guests.append(guest)
-        return guest.node
-
     def call(self, act: Callable[[Operator], Found]) -> Found:
         """Return act(operator); one call at a time."""
-        with self._lock, _refusals():
-            if self._operator is None:
-                self._operator = Operator(self._own("uam_operator"))
-            return act(self._operator)
+        return self._act(Operator, "uam_operator", act)
 
     def ask(self, name: str, *given: Any) -> str:
         """Return the answer to a method of the operator with these arguments, if it accepts."""
@@ -58,18 +48,21 @@ class Commands:
 
     def change(self, act: Callable[[ProfileSwitch], Changes]) -> Changes:
         """Return act(switch): what it has changed in all nodes, or in none; one call at a time."""
+        return self._act(ProfileSwitch, "uam_parameters", act)
+
+    def _act(self, kind: type, name: str, act: Callable[[Any], Found]) -> Found:
         with self._lock, _refusals():
-            if self._switch is None:
-                self._switch = ProfileSwitch(self._own("uam_parameters"))
-            return act(self._switch)
+            if kind not in self._clients:
+                guest = self.guest(name)
+                self._clients[kind] = guest, kind(guest.node)
+            return act(self._clients[kind][1])
 
     def close(self) -> None:
         """Close the clients."""
         with self._lock:
-            for guest in self._guests:
+            for guest, _ in self._clients.values():
                 guest.close()
-            self._guests.clear()
-            self._operator = self._switch = None
+            self._clients.clear()
 
 
 @contextlib.contextmanager

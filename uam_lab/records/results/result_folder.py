@@ -228,9 +228,13 @@ def git_commit(directory: Path | None = None) -> str | None:
 
 
 def make_folder(
-    out: Path | None, *words: str, now: datetime | None = None, shared: bool = False
+    out: Path | None,
+    *words: str,
+    now: datetime | None = None,
+    shared: bool = False,
+    parent: Path = RESULTS,
 ) -> Path:
-    """Make `out`, or results/<time>-<words>; return it. Raises ResultFolderError.
+    """Make `out`, or <time>-<words> in `parent`; return it. Raises ResultFolderError.
 
     `out` is this process's to its end, unless it is shared with others that do the same.
     """
@@ -241,7 +245,7 @@ def make_folder(
             claim_for_process(out)
         return out
     stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
-    return new_folder(RESULTS, "-".join([stamp, *map(in_a_name, words)]))
+    return new_folder(parent, "-".join([stamp, *map(in_a_name, words)]))
 
 
 def in_a_name(text: str) -> str:
