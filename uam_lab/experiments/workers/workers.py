@@ -10,7 +10,6 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from distributed import CancelledError, Client, Future, get_worker
@@ -145,20 +144,16 @@ class _LimitedClient(Client):
             raise
 
 
-@dataclass(frozen=True)
 class Workers:
     """Connected workers, see `workers`."""
 
-    client: Client
-    prepare: Callable[[], None] | None
-    say: Callable[[str], None]
-
-    def threads(self) -> int:
-        """Return the present number of threads of all workers."""
-        try:
-            return sum(self.client.nthreads().values())
-        except (OSError, TimeoutError):  # no scheduler at present
-            return 0
+    def __init__(
+        self, client: Client, prepare: Callable[[], None] | None, say: Callable[[str], None]
+    ) -> None:
+        self._client, self._prepare, self._say = client, prepare, say
+        self._name = f"flight-{uuid.uuid4().hex[:8]}"
+        self._expected = identity()
+        self._submitted = 0
 
     def completed(
         self,
@@ -172,34 +167,20 @@ class Workers:
         The items of a lost worker are computed again. idle: called about every second. Raises
         what `work` raises, WorkersError if workers or scheduler cannot be used.
         """
-        return _Run(self, work, Window(items, per_worker)).completed(idle)
-
-
-class _Run:
-    """One call of `Workers.completed`."""
-
-    def __init__(self, crew: Workers, work: Callable[[Any], Any], window: Window) -> None:
-        self._crew, self._work, self._window = crew, work, window
-        self._client = crew.client
-        self._name = f"flight-{uuid.uuid4().hex[:8]}"
-        self._expected = identity()
         self._futures: dict[int, Future] = {}
         self._finished: queue.SimpleQueue[int] = queue.SimpleQueue()
-        self._submitted = 0
         self._alive = self._looked = self._staffed = time.monotonic()
-        self._threads, self._told = 0, False
-
-    def completed(self, idle: Callable[[], None]) -> Iterator[tuple[int, Any]]:
-        self._threads = self._crew.threads()
+        self._told, self._threads = False, self.threads()
+        window = Window(items, per_worker)
         try:
             while True:
                 if self._client.status == "closed":
                     raise WorkersError("the connection to the scheduler is lost")
-                for number, item in self._window.fill(self._threads):
-                    self._submit(number, item)
-                if not self._window:
+                for number, item in window.fill(self._threads):
+                    self._submit(work, number, item)
+                if not window:
                     return
-                received = self._receive()
+                received = self._receive(window)
                 if received is not None:
                     yield received
                 if time.monotonic() - self._looked >= POLL:
@@ -211,21 +192,23 @@ class _Run:
                 with contextlib.suppress(Exception):
                     self._client.cancel(left, force=True)
 
-    def _submit(self, number: int, item: Any) -> None:
-        self._submitted += 1
-        future = self._client.submit(
-            run_item,
-            self._work,
-            item,
-            self._expected,
-            self._crew.prepare,
-            key=f"{self._name}-{self._submitted}",
-            pure=False,
-        )
-        self._futures[number] = future
-        future.add_done_callback(lambda _: self._finished.put(number))
+    def threads(self) -> int:
+        """Return the present number of threads of all workers."""
+        try:
+            return sum(self._client.nthreads().values())
+        except (OSError, TimeoutError):  # no scheduler at present
+            return 0
 
-    def _receive(self) -> tuple[int, Any] | None:
+    def _submit(self, work: Callable[[Any], Any], number: int, item: Any) -> None:
+        self._submitted += 1
+        given = work, item, self._expected, self._prepare
+        key = f"{self._name}-{self._submitted}"
+        future = self._client.submit(run_item, *given, key=key, pure=False)
+        self._futures[number] = future
+        finished = self._finished  # of this call of `completed`
+        future.add_done_callback(lambda _: finished.put(number))
+
+    def _receive(self, window: Window) -> tuple[int, Any] | None:
         """Return number and result of an item; None if there is none yet, or if it was lost."""
         try:
             number = self._finished.get(timeout=POLL)
@@ -233,37 +216,38 @@ class _Run:
             return None
         future = self._futures.pop(number)
         if future.status == "error":
-            self._failed(future.exception(), number)
+            _failed(window, future.exception(), number)
             return None
         try:
             result = future.result(RECEIVING)
         except (TimeoutError, CancelledError):  # its worker was lost with it
             future.cancel()
-            self._failed(None, number)
+            _failed(window, None, number)
             return None
-        self._window.done(number)
+        window.done(number)
         return number, result
-
-    def _failed(self, error: BaseException | None, number: int) -> None:
-        """Have a lost item computed again; raise every other error. error: None if it was lost."""
-        if error is None or isinstance(error, KilledWorker):
-            if not self._window.lost(number):
-                raise WorkersError(f"{number}: every worker that began it was lost")
-        elif isinstance(error, ModuleNotFoundError):
-            raise WorkersError(f"a worker cannot import {error.name}: install uam there") from error
-        else:
-            raise error
 
     def _look(self) -> None:
         """Notice a change of the number of workers, and a lost scheduler."""
         now = self._looked = time.monotonic()
         if self._client.status == "running":
             self._alive = now
-            self._threads = self._crew.threads()
+            self._threads = self.threads()
         elif now - self._alive > GONE:
             raise WorkersError("the connection to the scheduler is lost")
         if self._threads:
             self._staffed, self._told = now, False
         elif now - self._staffed > WAITING and not self._told:
-            self._crew.say("waiting for a worker")
+            self._say("waiting for a worker")
             self._told = True
+
+
+def _failed(window: Window, error: BaseException | None, number: int) -> None:
+    """Have a lost item computed again; raise every other error. error: None if it was lost."""
+    if error is None or isinstance(error, KilledWorker):
+        if not window.lost(number):
+            raise WorkersError(f"{number}: every worker that began it was lost")
+    elif isinstance(error, ModuleNotFoundError):
+        raise WorkersError(f"a worker cannot import {error.name}: install uam there") from error
+    else:
+        raise error
