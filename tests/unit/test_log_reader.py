@@ -64,6 +64,15 @@ def test_the_thrust_factor_holds_between_its_messages():
     np.testing.assert_array_equal(found.at(np.array([4_000_000, 104_000_000]))[:, 0], [1.0, 0.9])
 
 
+def test_wall_times_belong_to_their_stamps_where_two_layouts_come_mixed():
+    writers = JointStateWriter(["a"]), JointStateWriter(["a", "b"])
+    messages = [bytes(writers[k % 2].stamped(1000 * k)) for k in range(4)]
+    found = TopicLog("sensor_msgs/msg/JointState", [], messages, [10, 11, 12, 13])
+    stamps, sent = Log({expanded("/", topics.THRUST.name): found}).published(topics.THRUST)
+    pairs = dict(zip(stamps.tolist(), sent.tolist(), strict=True))
+    assert pairs == {0: 10, 1000: 11, 2000: 12, 3000: 13}
+
+
 def written(path, *names):
     """Write a log with one message on each topic."""
     kind = "sensor_msgs/msg/JointState"

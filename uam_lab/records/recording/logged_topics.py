@@ -153,7 +153,9 @@ class Log:
         log, blocks = self._topics.get(topic), self.blocks(topic)
         if log is None or not blocks:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        return np.concatenate([one.stamps for one in blocks]), np.array(log.published)
+        stamps = np.concatenate([one.stamps for one in blocks])
+        order = np.concatenate([one.order for one in blocks])  # of two layouts they come mixed
+        return stamps, np.array(log.published)[order]
 
     def blocks(self, topic: Topic) -> list[Block]:
         """Return the decoded messages of a topic, decoded once; may be empty.
