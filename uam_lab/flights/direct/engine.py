@@ -34,25 +34,20 @@ def fly(
     flight.say = observer.message
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()
-    try:
-        flight.run(lambda *_: _report(flight, begin, observer, stop))
-    except _Stopped:
-        pass
+
+    def stopped() -> bool:
+        if not stop.raised and flight.recording.count:
+            observer.update(_status(flight, time.monotonic() - begin))
+        return stop.raised
+
+    flight.run(stopped)
     wall, interrupted = time.monotonic() - begin, stop.raised and not flight.mission.output.done
     return flight.outcome(wall_s=wall, interrupted=interrupted)
 
 
-class _Stopped(Exception):
-    """A stop was requested."""
-
-
-def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRequest) -> None:
-    """Show where the flight is; called once a simulated second. Raises _Stopped."""
-    if stop.raised:
-        raise _Stopped
+def _status(flight: DirectFlight, wall: float) -> FlightStatus:
+    """Return where the flight is; wall [s]: since its begin."""
     recording = flight.recording
-    if not recording.count:
-        return
     row, output = recording.values[recording.count - 1], flight.mission.output
     columns = recording.columns
     size = columns.size
@@ -60,15 +55,12 @@ def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRe
     error = estimate - row[columns.block("reference.")][:size]
     error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
     norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
-    wall = time.monotonic() - begin
-    observer.update(
-        FlightStatus(
-            phase=output.phase,
-            time=output.time,
-            position_error=norms[0] * output.flying,
-            attitude_error=norms[1] * output.flying,
-            tilt=tilt(estimate[ATTITUDE]),
-            arm_error=norms[2],
-            real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
-        )
+    return FlightStatus(
+        phase=output.phase,
+        time=output.time,
+        position_error=norms[0] * output.flying,
+        attitude_error=norms[1] * output.flying,
+        tilt=tilt(estimate[ATTITUDE]),
+        arm_error=norms[2],
+        real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
     )

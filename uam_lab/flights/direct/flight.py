@@ -92,11 +92,8 @@ class DirectFlight:
         )
         self.compiled = CompiledTicks(self)
 
-    def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
-        """Fly until mission and vehicle are at their end.
-
-        progress(mission time [s], phase): called once a second.
-        """
+    def run(self, stopped: Callable[[], bool] = lambda: False) -> FlightTable:
+        """Fly until mission and vehicle are at their end; stopped: asked once a second."""
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not (output.done and settled.after_mission(plant.time, self.armed)):
@@ -108,8 +105,8 @@ class DirectFlight:
                 self.ended_by = str(error)
                 break
             if plant.tick // ticks_a_second > second:
-                if progress is not None:
-                    progress(output.time, output.phase)
+                if stopped():
+                    break
                 if settled.over(plant.time, self.armed):
                     silent = plant.time - self.control.mission.ahead / SECOND
                     lost = f"no state of the estimator for {silent:.1f} s: IMU lost? "
