@@ -65,14 +65,10 @@ class Command:
     def option(
         self, flag: str, metavar: str | tuple[str, ...], text: str, default: Any = None, **how: Any
     ) -> None:
-        """Add an option with a value."""
+        """Add an option with a value, or an argument: a flag without dashes."""
         if default not in (None, ""):
             text = f"{text} (default %(default)s)".strip()
         self._add(flag, metavar=metavar, help=text, default=default, **how)
-
-    def argument(self, name: str, metavar: str, text: str, **how: Any) -> None:
-        """Add an argument without a flag."""
-        self._add(name, metavar=metavar, help=text, **how)
 
     def repeated(self, flag: str, metavar: str, text: str, **how: Any) -> None:
         """Add an option that may be given several times; its value is a list."""

@@ -40,7 +40,7 @@ def page(_: str) -> str:
 
 
 def add(command: Command) -> None:
-    command.argument("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
+    command.option("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
     command.option("--out", "DIR", "folder of the files (default ./NAME)", type=Path)
     command.option("--name", "NAME", "of the vehicle (default: that of the file)", "")
     command.option("--answers", "FILE", "answers in YAML, by the keys below", type=Path)

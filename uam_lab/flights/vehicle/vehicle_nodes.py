@@ -56,8 +56,9 @@ def parameters(
         "autopilot_system": lab.autopilot_system,
         "imu_clock": "system",
     }
+    switching = lab.magnet.switching.to_mapping()
     if lab.magnet.through == AUTOPILOT:
-        sections[wiring.BRIDGE] |= lab.magnet.output.to_mapping() | _switching(lab)
+        sections[wiring.BRIDGE] |= lab.magnet.output.to_mapping() | switching
     host = lab.cockpit.address
     port = page_address.free_port(host, lab.cockpit.port)
     results = str(folder.path.absolute())
@@ -70,7 +71,7 @@ def parameters(
     if lab.mocap is not None:
         sections[wiring.MOCAP_DRIVER] = WAITS | lab.mocap.to_mapping()
     if lab.magnet.through == GPIO:
-        sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | _switching(lab)
+        sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | switching
     own = {key: value for key, value in lab.process.items() if key != "busy_poll"}
     for node in DRIVERS.keys() & sections.keys():  # in the loop as the nodes behind them
         sections[node] |= own
@@ -92,10 +93,6 @@ def _checklist(lab: Lab, settings: FlightSettings, folder: ResultFolder) -> dict
         "magnet": lab.magnet.through != NONE,
         "vehicle": settings.vehicle.source,
     }
-
-
-def _switching(lab: Lab) -> dict[str, Any]:
-    return lab.magnet.switching.to_mapping()
 
 
 def sources(lab: Lab) -> dict[str, str]:
