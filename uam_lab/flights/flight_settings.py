@@ -52,15 +52,12 @@ AUTOPILOT = "autopilot"  # name of its process
 
 @dataclass(frozen=True, kw_only=True)
 class FlightSettings(KeptOptions):
-    """Checked settings of one flight, with scenario and profile loaded.
+    """Checked settings of one flight, with scenario and profile loaded; see `FlightOptions`, too.
 
-    payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
-    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. link: to an
-    autopilot started by the user, parsed. without: nodes that are not started, see `foreign`;
-    own_names: those of the nodes that the user starts in place of them, where they differ.
-    auto_start: the flight begins without a command; dry_run: nothing is armed. parameters: of the
-    nodes without a profile, node → name → value. remappings: node, or EVERY_NODE → topic or service
-    → new name. namespace: of all nodes, in the form of ROS; domain: None for that of the instance.
+    payload_mass [kg]; out: None for the default folder. link: to an autopilot started by the user,
+    parsed. without: nodes that are not started, see `foreign`; own_names: those of the nodes that
+    the user starts in place of them, where they differ. parameters: of the nodes without a profile.
+    remappings: node, or EVERY_NODE → topic or service → new name. namespace: in the form of ROS.
     """
 
     scenario: Scenario
