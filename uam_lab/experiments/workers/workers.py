@@ -152,7 +152,6 @@ class Workers:
     ) -> None:
         self._client, self._prepare, self._say = client, prepare, say
         self._name = f"flight-{uuid.uuid4().hex[:8]}"
-        self._expected = identity()
         self._submitted = 0
 
     def completed(
@@ -171,6 +170,7 @@ class Workers:
         self._finished: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._alive = self._looked = self._staffed = time.monotonic()
         self._told, self._threads = False, self.threads()
+        self._expected = identity()
         window = Window(items, per_worker)
         try:
             while True:
