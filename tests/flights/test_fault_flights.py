@@ -38,7 +38,7 @@ def flown(*texts, seed=1, plant="calm", watch=None, scenario=SCENARIO):
     faults, payload = read_schedule(texts, scenario, seed), scenario.payload_mass
     vehicle = Vehicle.load().changed(presets.added({}, presets.read([plant])))
     flight = DirectFlight(scenario, load_profile("s500"), vehicle, payload, seed, faults)
-    flight.run(lambda: watch is not None and bool(watch(flight)))
+    flight.run(watch and (lambda time, phase: watch(flight)))
     series = flight.recording.series()
     reason = flight.mission.output.abort_reason or flight.ended_by
     info = {

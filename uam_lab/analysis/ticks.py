@@ -1,5 +1,7 @@
 """Selection of the ticks for the analysis: airborne, thinned out, with or without payload."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from uam_control.laws.modular import ModularLaw
@@ -18,13 +20,18 @@ def in_the_air(series: Series) -> np.ndarray:
 
     Rows on the ground are left out: the paper's model has no ground contact.
     """
-    if len(series) < FEWEST or not series.flown.any():
-        return np.zeros(0, dtype=int)
     names = ModularLaw.gain_names(0)  # those that every subsystem has
     gains = [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
+    return airborne(series, gains)
+
+
+def airborne(series: Series, further: Sequence[np.ndarray] = ()) -> np.ndarray:
+    """Return the rows of `in_the_air` for any law; further: blocks (ticks, ..) without gaps, too"""
+    if len(series) < FEWEST or not series.flown.any():
+        return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
     complete = np.logical_and.reduce(
-        [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), *gains)]
+        [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), *further)]
     )
     rows = np.flatnonzero(flown & complete)
     return rows[:: max(1, round(1.0 / (FREQUENCY * period(series))))]

@@ -35,12 +35,13 @@ def fly(
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()
 
-    def stopped() -> bool:
+    def report(_: float, __: str) -> bool:
+        """Show where the flight is; return whether it ends."""
         if not stop.raised and flight.recording.count:
             observer.update(_status(flight, time.monotonic() - begin))
         return stop.raised
 
-    flight.run(stopped)
+    flight.run(report)
     wall, interrupted = time.monotonic() - begin, stop.raised and not flight.mission.output.done
     return flight.outcome(wall_s=wall, interrupted=interrupted)
 

@@ -92,8 +92,11 @@ class DirectFlight:
         )
         self.compiled = CompiledTicks(self)
 
-    def run(self, stopped: Callable[[], bool] = lambda: False) -> FlightTable:
-        """Fly until mission and vehicle are at their end; stopped: asked once a second."""
+    def run(self, progress: Callable[[float, str], object] | None = None) -> FlightTable:
+        """Fly until mission and vehicle are at their end.
+
+        progress(mission time [s], phase): called once a second; a true answer ends the flight.
+        """
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not (output.done and settled.after_mission(plant.time, self.armed)):
@@ -105,7 +108,7 @@ class DirectFlight:
                 self.ended_by = str(error)
                 break
             if plant.tick // ticks_a_second > second:
-                if stopped():
+                if progress is not None and progress(output.time, output.phase):
                     break
                 if settled.over(plant.time, self.armed):
                     silent = plant.time - self.control.mission.ahead / SECOND
