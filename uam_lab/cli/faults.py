@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     from uam_lab.experiments.faults import matrix as fault_matrix
     from uam_lab.experiments.faults import report
-    from uam_lab.experiments.faults.trial import ROWS, FaultTrial, measure
+    from uam_lab.experiments.faults.trial import ROWS, FaultTrial
     from uam_lab.experiments.trials.experiment import Experiment
 
     place = place_of(options)
@@ -99,9 +99,13 @@ def run(options: argparse.Namespace) -> int:
             plant_preset=options.plant_preset,
             effect=options.effects,
         )
+        from uam_lab.experiments.faults.rehearsed import measure  # needs ROS
+
         lab = load_lab(options.config)
         vehicle, profile = lab.vehicle, settings_of(lab).profile
     else:
+        from uam_lab.experiments.faults.trial import measure
+
         vehicle = load_description(options.vehicle or DEFAULT_VEHICLE)
         lab, profile = None, given_profile(options.profile, vehicle)
     file = configuration.named("campaign", options.matrix)

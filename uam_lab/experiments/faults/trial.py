@@ -49,11 +49,7 @@ class FaultResult:
 
 
 def measure(trial: FaultTrial) -> FaultResult:
-    """Fly or rehearse a trial; return its result. Raises ConfigurationError, ScenarioError."""
-    if trial.lab:
-        from uam_lab.experiments.faults import rehearsed  # needs ROS
-
-        return rehearsed.measure(trial)
+    """Fly a trial; return its result. Raises ConfigurationError, ScenarioError."""
     outcome = fly(trial)
     recorded = outcome.series is not None
     figures = figures_of(trial, outcome, outcome.reason) if recorded else None
