@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import psutil
-import pytest
 
 from uam_lab.flights.processes import process_table
 from uam_sim_bridge.ports import SIMULATOR_TCP
@@ -30,11 +29,6 @@ moves:
   - {coordinate: z, from: 0, until: 1.5, to: 0.6}
 landing: {at: 2, duration: 2}
 """
-
-
-def longer(*values):
-    """Return a case of `make long`: another moment or seed of a case that `make test` flies."""
-    return pytest.param(*values, marks=pytest.mark.long)
 
 
 class Flight:

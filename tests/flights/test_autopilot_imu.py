@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from flight_warnings import stamps, staying
+from longer import longer
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
@@ -48,9 +49,7 @@ def flown(name, autopilot_imu):
     return flight, metrics.errors(flight.recording.series())
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=pytest.mark.long) for one in ("quick_pick", "pick_and_place")]
-)
+@pytest.mark.parametrize("name", [longer(one) for one in ("quick_pick", "pick_and_place")])
 def test_the_mission_is_completed_with_jitter_as_with_the_companions_imu(name):
     _, nominal = flown(name, autopilot_imu=False)
     flight, errors = flown(name, autopilot_imu=True)

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
+from longer import longer
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
@@ -74,7 +75,7 @@ def test_a_payload_that_a_rotor_cannot_hold_costs_no_vehicle(number, stands):
 @pytest.mark.parametrize(
     "scenario",
     [
-        pytest.param("hover", marks=pytest.mark.long),
+        longer("hover"),
         pytest.param("pick_and_place", marks=pytest.mark.slow),
     ],
 )

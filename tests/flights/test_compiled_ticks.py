@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from whole_flight import longer
+from longer import longer
 
 from uam_control.mission import load_scenario
 from uam_control.offboard.modes import Mode

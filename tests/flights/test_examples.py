@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from longer import longer
 from whole_flight import PATIENCE, ROOT
 
 from uam_lab import Flight
@@ -103,7 +104,7 @@ def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     assert one != other
 
 
-@pytest.mark.parametrize("engine", ["direct", pytest.param("ros", marks=pytest.mark.long)])
+@pytest.mark.parametrize("engine", ["direct", longer("ros")])
 def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     said = run("own_simulator.py", engine, short_scenario, tmp_path)
     found = json.loads((tmp_path / "metrics.json").read_text())

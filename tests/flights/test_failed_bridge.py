@@ -4,6 +4,7 @@ It fails as it does when the autopilot reboots while it is armed.
 """
 
 import pytest
+from longer import longer
 from wired_flight import wired_flight
 
 from uam_control.coordinates import CHI, CHI_DOT, Z
@@ -57,7 +58,7 @@ def test_in_flight_it_lands_the_vehicle():
     assert f"bridge: {REBOOTED}" in flight.mission.output.abort_reason
 
 
-@pytest.mark.parametrize("mode", [pytest.param(Mode.LAND, marks=pytest.mark.long), Mode.POSITION])
+@pytest.mark.parametrize("mode", [longer(Mode.LAND), Mode.POSITION])
 def test_who_takes_over_from_a_failed_bridge_has_the_vehicle(mode):
     flight = failed(hovers)
     fly(flight, 0.3)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from whole_flight import longer
+from longer import longer
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile

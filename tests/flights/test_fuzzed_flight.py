@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import whole_flight
+from longer import longer
 from whole_flight import SHORT
 
 from uam_lab.flights.processes.node_environment import transport_environment
@@ -75,7 +76,7 @@ def complete(flight):
 @pytest.mark.parametrize(
     "options",
     [
-        pytest.param((), id="separate", marks=pytest.mark.long),
+        longer((), id="separate"),
         pytest.param(("--fused",), id="fused", marks=pytest.mark.slow),  # for the time of CI
     ],
 )

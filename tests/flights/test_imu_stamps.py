@@ -4,6 +4,7 @@ import json
 
 import pytest
 from flight_warnings import last_values, staying, warnings
+from longer import longer
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
@@ -15,8 +16,8 @@ from uam_sim_bridge.plant import Vehicle
 # scenario, jitter [s]
 FLIGHTS = [
     ("quick_pick", 0.001),
-    pytest.param("pick_and_place", 0.0002, marks=pytest.mark.long),
-    pytest.param("pick_and_place", 0.001, marks=pytest.mark.long),
+    longer("pick_and_place", 0.0002),
+    longer("pick_and_place", 0.001),
 ]
 RMS = ("position_m", "attitude_deg", "arm_deg")
 

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from longer import longer
 from wired_flight import KILL_CHANNEL, wired_flight
 
 from uam_control.coordinates import CHI, Z
@@ -92,7 +93,7 @@ def test_a_kill_is_final_also_when_the_switch_goes_off_again(phase, seconds):
     ("phase", "seconds"),
     [
         (HOVER, 0.3),
-        *(pytest.param(*case, marks=pytest.mark.long) for case in [(GROUND, 0.3), (HOVER, 6.0)]),
+        *(longer(*case) for case in [(GROUND, 0.3), (HOVER, 6.0)]),
     ],
 )
 def test_the_same_over_mavlink(phase, seconds):

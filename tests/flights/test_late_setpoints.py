@@ -1,6 +1,7 @@
 """A fast reference and late setpoints together: what is accepted is flown, the rest stays down."""
 
 import pytest
+from longer import longer
 
 from uam_control.mission import ScenarioError
 from uam_lab import Flight
@@ -32,7 +33,7 @@ def flown(folder, way, delay, seed, begin="start", reserve=0.0):
         return flight.wait().metrics
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [1, longer(3)])
 def test_a_fast_zigzag_does_not_take_off_with_late_setpoints(tmp_path, seed):
     found = flown(tmp_path, 5.2, 0.028, seed)
     assert "that the reference stands" in found["abort_reason"]

@@ -7,6 +7,7 @@ from collections import deque
 from pathlib import Path
 
 import pytest
+from longer import longer
 
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
@@ -65,7 +66,7 @@ def test_a_payload_in_its_place_is_picked_without_a_wait():
     assert landed == pytest.approx(a_flight.mission.scenario.landing.at + 4.0, abs=1.0)
 
 
-@pytest.mark.parametrize("seed", [4, pytest.param(9, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [4, longer(9)])
 def test_a_payload_in_its_place_is_picked_in_gusts(seed):
     """With 1.2 m/s of gusts these two were taken for flights without payload."""
     a_flight = flight(seed=seed, **{"air.wind": [3.0, 2.0, 0.0], "air.gust": 1.2})

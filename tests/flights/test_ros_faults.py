@@ -27,6 +27,7 @@ IN_NODES = (
 )
 
 
+@pytest.mark.long
 def test_without_the_autopilots_voice_it_lands_by_itself(fly):
     """Setpoints still arrive, but nobody knows: no heartbeat for 3 s, then autopilot_age_land."""
     cut = "mavlink_cut@hover+0.5:direction=from_autopilot"

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from longer import longer
 
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
@@ -70,9 +71,7 @@ def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
 
 
 # with the payload, almost at rest and in motion, which is stopped on the path
-@pytest.mark.parametrize(
-    ("when", "within"), [pytest.param(13.2, 0.15, marks=pytest.mark.long), (10.5, 0.7)]
-)
+@pytest.mark.parametrize(("when", "within"), [longer(13.2, 0.15), (10.5, 0.7)])
 def test_a_command_to_land_is_followed_where_the_vehicle_is_with_the_payload_released(when, within):
     made = flight("quick_pick", magnet_landing="release")
     until(made, lambda o: o.time > when)
@@ -90,7 +89,7 @@ def most_tilt(a_flight):
     return np.degrees(np.nanmax(np.hypot(series["truth.roll"], series["truth.pitch"])))
 
 
-@pytest.mark.parametrize("after", [pytest.param(0.05, marks=pytest.mark.long), 0.3])
+@pytest.mark.parametrize("after", [longer(0.05), 0.3])
 def test_a_landing_while_the_payload_still_stands_lets_it_go(after):
     """With the magnet on, the arm that stows would lever the vehicle over on the stand."""
     made = flight("quick_pick")

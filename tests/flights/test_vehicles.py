@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import tilted_arm
 import yaml
+from longer import longer
 from whole_flight import SHORT, Flight
 
 from uam_control.laws.modular import ModularLaw
@@ -109,7 +110,7 @@ def test_the_third_joint_is_supervised():
     assert series["truth.alpha_3"][row] > 0.5 > abs(series["truth.alpha_1"][row])
 
 
-@pytest.mark.parametrize("name", [pytest.param("hexa_arm", marks=pytest.mark.long), "s500_arm3"])
+@pytest.mark.parametrize("name", [longer("hexa_arm"), "s500_arm3"])
 def test_it_flies_through_the_nodes(name, tmp_path):
     scenario = tmp_path / "short.yaml"
     lines = SHORT.splitlines(keepends=True)

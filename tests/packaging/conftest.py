@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from longer import longer
 
 ROOT = Path(__file__).resolve().parents[2]
 NOT_SOURCES = {".git", ".venv", "results", "build", "install", "log"}  # of the top folder
@@ -45,7 +46,7 @@ class Workspace:
         return done.stdout.strip()
 
 
-@pytest.fixture(scope="session", params=["plain", "symlink"])
+@pytest.fixture(scope="session", params=["plain", longer("symlink")])
 def workspace(request, tmp_path_factory) -> Workspace:
     """Built without any network."""
     if importlib.util.find_spec("colcon") is None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numba
 import pytest
 from fresh_process import FreshProcess
+from longer import longer
 
 from uam_lab.flights.direct import warm_up
 from uam_lab.flights.ros import node_arguments as ros_nodes
@@ -139,7 +140,7 @@ def test_the_second_process_compiles_nothing(tmp_path, start):
     assert start().call("result", "float64") == (15.0, 1)
 
 
-@pytest.mark.parametrize("change", [{"factor": 5}, {"offset": 13}])
+@pytest.mark.parametrize("change", [{"factor": 5}, longer({"offset": 13})])
 def test_an_edit_of_what_is_called_is_seen_by_the_caller(tmp_path, change, start):
     write(tmp_path)
     start().call("result", "float64")
@@ -168,7 +169,9 @@ def test_a_process_killed_while_it_wrote_leaves_nothing_that_is_loaded(tmp_path,
     assert start().call("result", "float64") == (15.0, 0)
 
 
-@pytest.mark.parametrize("content", [b"", b"no pickle", b"cmoved.away\nArguments\n."])
+@pytest.mark.parametrize(
+    "content", [b"no pickle", longer(b""), longer(b"cmoved.away\nArguments\n.")]
+)
 def test_a_file_that_cannot_be_read_is_compiled_again(tmp_path, content, start):
     """As a file of a version in which a class of the arguments was in another module."""
     write(tmp_path)

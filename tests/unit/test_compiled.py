@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from longer import longer
 
 from uam_control.laws.law import LawInputs
 from uam_control.maths import compiled
@@ -37,7 +38,7 @@ def flown(profile: str, without_numba: bool) -> list:
 
 @pytest.mark.parametrize(
     "profile",
-    ["s500", *(pytest.param(one, marks=pytest.mark.long) for one in ("asmc1", "asmc2"))],
+    ["s500", *(longer(one) for one in ("asmc1", "asmc2"))],
 )
 def test_without_numba_a_flight_is_the_same_up_to_rounding(profile):
     fast, plain = flown(profile, False), flown(profile, True)

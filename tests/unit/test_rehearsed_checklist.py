@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from free_port import free_port
+from longer import longer
 
 from uam_control.maths.rotations import matrix_from_quaternion
 from uam_control.vehicle import load_description
@@ -125,7 +126,7 @@ def test_all_steps_pass_with_the_right_wiring(rehearsed):
         ({"fault": "mocap_turned", "turn": 90.0}, "tilt_roll", "swapped?"),
         ({"fault": "direction_reversed", "joint": 1}, "joint:alpha_1", "reversed?"),
         *(
-            pytest.param(*case, marks=pytest.mark.long)
+            longer(*case)
             for case in (
                 ({"fault": "mocap_axes"}, "tilt_pitch", "swapped?"),
                 ({"fault": "mocap_turned", "turn": 180.0}, "tilt_roll", "reversed?"),

@@ -169,6 +169,7 @@ def test_ctrl_c_says_how_the_search_goes_on(tmp_path, capsys, monkeypatch):
     assert "the same command continues the search" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_start_whose_evaluation_was_killed_is_evaluated_again(tmp_path, capsys):
     file, out = write(tmp_path), tmp_path / "out"
     out.mkdir()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from longer import longer
 from random_chains import chi_of, in_pinocchio, pin, random_chain
 
 from uam_control.arm.chain import as_parameters
@@ -149,9 +150,7 @@ def test_a_joint_that_is_cut_is_missing_at_the_base():
 
 
 # 4 joints; 1 and 7 joints, for which the law is compiled half a minute each
-@pytest.mark.parametrize(
-    "seed", [1, 6, *(pytest.param(one, marks=pytest.mark.long) for one in (7, 11, 13, 23))]
-)
+@pytest.mark.parametrize("seed", [1, 6, *(longer(one) for one in (7, 11, 13, 23))])
 def test_any_arm_of_one_to_seven_joints(seed):
     """At rest it holds every random vehicle; beside its reference the outputs are finite."""
     random = np.random.default_rng(seed)
