@@ -11,10 +11,13 @@ from uam_control.supervision.checks import Checks
 from uam_control.supervision.monitor import Level
 
 
-def seen(*rows):
-    """What `stands` says of each row: reading, reference [rad], torque [N m], largest 2.5 N m."""
-    memory = still_joints(1)
-    return [stands(memory, 0, *row, 2.5, 1.0) for row in rows]
+def seen(*rows, known=(0.0, 0.0)):
+    """What `stands` says of each row: reading, reference [rad], torque [N m], largest 2.5 N m.
+
+    known [N m]: parts of the torques of the first row, and of the others, for the known load.
+    """
+    memory, load = still_joints(1), [known[0], *[known[1]] * (len(rows) - 1)]
+    return [stands(memory, 0, *row, one, 2.5, 1.0) for row, one in zip(rows, load, strict=True)]
 
 
 # from 0.5 N m, friction holds up to 2 * .06 * 2.5 + .4 (.5 + |torque|) = .5 + .4 |torque|
@@ -29,6 +32,18 @@ def seen(*rows):
 ])  # fmt: skip
 def test_what_friction_cannot_hold_contradicts_a_reading_that_stays(row, found):
     assert seen((0.0, 0.0, 0.5), row) == [False, found]
+
+
+# the torque changes by -.6 of .54; less what the known load changes by
+@pytest.mark.parametrize(("load", "found"), [
+    ((0.3, 0.3), True),
+    ((0.3, 0.25), True),  # .55 remain
+    ((0.3, 0.2), False),  # .5 remain: the other joints have moved
+    ((0.3, 0.5), True),  # .8 remain, and .6 with the load as it was
+    ((0.3, -0.4), False),  # the load explains more than the change
+])  # fmt: skip
+def test_a_torque_that_follows_its_known_load_contradicts_nothing(load, found):
+    assert seen((0.0, 0.0, 0.5), (0.0, 0.04, -0.1), known=load) == [False, found]
 
 
 def test_it_lasts_until_the_reading_changes_by_more_than_a_stuck_joint_creeps():

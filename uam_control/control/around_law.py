@@ -216,7 +216,8 @@ def let_go(a: ArmArrays, state: np.ndarray, reference: np.ndarray) -> None:
     of = a.all
     for i in range(len(a.still)):
         angle, wanted = state[CHI, ALPHA + i], reference[CHI, ALPHA + i]
-        if stands(a.still, i, angle, wanted, of.tau[i], a.torque_max[i], 1.0):
+        torque, known = of.tau[i], a.load.torques[i]
+        if stands(a.still, i, angle, wanted, torque, known, a.torque_max[i], 1.0):
             of.errors[E, ALPHA + i] = of.errors[E_DOT, ALPHA + i] = 0.0
 
 

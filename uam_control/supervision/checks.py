@@ -282,7 +282,7 @@ def measure_all(
     for i in range(min(state.shape[1] - ALPHA, len(readings.effort), len(a.still))):
         own = state[CHI, ALPHA + i] if in_flight else math.nan
         wanted, torque = reference[CHI, ALPHA + i], readings.effort[i]
-        if stands(a.still, i, own, wanted, torque, bounds[effort + i], SOON):
+        if stands(a.still, i, own, wanted, torque, 0.0, bounds[effort + i], SOON):
             values[STILL] = 1.0
     link = by_link(known[_ROUND_TRIP], m.share, in_flight)
     loop = by_loop(known[_LOOP_DELAY], m.delay_nominal, in_flight)
