@@ -15,6 +15,7 @@ from uam_control.supervision.states import AIRBORNE_STATES, TARGETS
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.vehicle_health import Health
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.navigation import goal_message
 
 Later = Callable[[Callable[[], None]], None]
 Said = Callable[[bool, str], None]
@@ -155,8 +156,7 @@ class Commands:
 
     def bring_hand(self, place: np.ndarray) -> None:
         """Send a goal of the hand, place (3,) [m]; its heading stays."""
-        goal = goal_of(" ".join(map(repr, place.tolist())))
-        self._services.publish(topics.END_EFFECTOR_GOAL, goal)
+        self._services.publish(topics.END_EFFECTOR_GOAL, goal_message(place))
 
 
 def goal_of(text: str) -> PoseStamped:
@@ -172,14 +172,7 @@ def goal_of(text: str) -> PoseStamped:
     if len(numbers) not in (2, 3, 4) or not all(map(math.isfinite, numbers)):
         raise ValueError(f"{text.strip() or 'nothing'}: {GOAL} expected, as 0.5, 0, 1.2, 90")
     x, y, z, *yaw = [*numbers, 0.0][: max(3, len(numbers))]
-    goal = PoseStamped()
-    goal.header.frame_id = topics.WORLD
-    place, turn = goal.pose.position, goal.pose.orientation
-    place.x, place.y, place.z = x, y, z
-    turn.w = turn.z = 0.0  # zeros: no orientation
-    for degrees in yaw:
-        turn.w, turn.z = (part(math.radians(degrees) / 2.0) for part in (math.cos, math.sin))
-    return goal
+    return goal_message((x, y, z), *map(math.radians, yaw))
 
 
 def _kind(button: Button) -> type:

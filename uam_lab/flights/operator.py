@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger
 from uam_control.supervision import PreflightCheck
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import ChecklistItem, read_items, read_preflight
+from uam_msgs_py.messages.navigation import goal_message
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.polling import listen
@@ -92,13 +93,7 @@ class Operator:
         hand: of the end effector; its z = 0 is a height. Returns whether it was accepted, and the
         mission's answer. Raises NoFlight.
         """
-        goal = PoseStamped()
-        goal.header.frame_id = topics.WORLD
-        position, turn = goal.pose.position, goal.pose.orientation
-        position.x, position.y, position.z = float(x), float(y), float(z)
-        known = not math.isnan(yaw)  # zeros: no orientation
-        turn.w, turn.z = (math.cos(yaw / 2.0), math.sin(yaw / 2.0)) if known else (0.0, 0.0)
-        return self.plan(goal, hand)
+        return self.plan(goal_message((x, y, z), yaw), hand)
 
     def plan(self, message: Any, hand: bool = False) -> tuple[bool, str]:
         """Send a goal or trajectory on the mission's topic of its type; see `goto`."""

@@ -1,6 +1,7 @@
 """The estimate and the plan in nav_msgs, for standard tools."""
 
 import math
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -46,12 +47,25 @@ def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odomet
 def hand_message(stamp: int, chain: Chain, chi: np.ndarray) -> PoseStamped:
     """Return the pose of the end effector at `stamp` [ns] for chi (6 + n,), in the world."""
     place, turn = hand_in_world(chain, chi)
+    message = _pose_message(place, quaternion_from_matrix(np.array(turn)))
+    set_stamp(message.header.stamp, stamp)
+    return message
+
+
+def goal_message(place: Sequence[float], yaw: float = math.nan) -> PoseStamped:
+    """Return a goal pose: place (3,) [m, ENU]; yaw [rad], NaN: the present heading stays."""
+    along = 0.0, 0.0  # zeros: no orientation
+    if not math.isnan(yaw):
+        along = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
+    return _pose_message(place, (along[0], 0.0, 0.0, along[1]))
+
+
+def _pose_message(place: Sequence[float], quaternion: Sequence[float]) -> PoseStamped:
     message = PoseStamped()
     message.header.frame_id = WORLD
-    set_stamp(message.header.stamp, stamp)
-    at, turned = message.pose.position, message.pose.orientation
-    at.x, at.y, at.z = place
-    turned.w, turned.x, turned.y, turned.z = quaternion_from_matrix(np.array(turn)).tolist()
+    at, turn = message.pose.position, message.pose.orientation
+    at.x, at.y, at.z = map(float, place)
+    turn.w, turn.x, turn.y, turn.z = map(float, quaternion)
     return message
 
 
