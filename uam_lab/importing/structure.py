@@ -9,6 +9,7 @@ import numpy as np
 
 from uam_lab.importing.rotors import FoundRotor, find_rotors, rotor_joints
 from uam_lab.importing.source import ImportRefused, JointFacts, Source
+from uam_sim_bridge.plant.arm_geometry import carriers
 
 LONGEST_ARM = 7  # joints
 FINGER = re.compile(r"finger|jaw|claw|knuckle|gripper|hand|mimic", re.I)
@@ -81,7 +82,7 @@ def find(source: Source, chosen: Chosen) -> Parts:
         tilt = np.degrees(np.arccos(max(up, -1.0)))
         text = f"its z axis is {tilt:.0f} deg from up; x forward, z up expected"
         raise source.error("body", model.body(base).name, text)
-    inside = [b for b in range(base, model.nbody) if _is_below(model, b, base)]
+    inside = [b for b in range(base, model.nbody) if base in carriers(model, b)]
     spinning = rotor_joints(model, source, inside)
     joints = _chain(source, model, base, inside, spinning, chosen.arm)
     owner = _owners(model, base, inside, joints)
@@ -96,12 +97,6 @@ def find(source: Source, chosen: Chosen) -> Parts:
             )
     parts.tip = _tip(parts, chosen.end_effector)
     return parts
-
-
-def _is_below(model: mujoco.MjModel, body: int, top: int) -> bool:
-    while body > top:
-        body = model.body_parentid[body]
-    return body == top
 
 
 def _base(source: Source, model: mujoco.MjModel, given: str) -> int:
@@ -136,7 +131,7 @@ def _with_mass(source: Source, model: mujoco.MjModel, base: int) -> int:
 
 def _has_hinge(model: mujoco.MjModel, top: int) -> bool:
     return any(
-        model.jnt_type[j] == HINGE and _is_below(model, model.jnt_bodyid[j], top)
+        model.jnt_type[j] == HINGE and top in carriers(model, model.jnt_bodyid[j])
         for j in range(model.njnt)
     )
 
@@ -185,11 +180,7 @@ def _chain(
 
 def _is_ours(model: mujoco.MjModel, body: int) -> bool:
     """Return whether a body belongs to the magnet that the import itself adds."""
-    while body:
-        if model.body(body).name == "magnet":
-            return True
-        body = model.body_parentid[body]
-    return False
+    return any(model.body(b).name == "magnet" for b in carriers(model, body))
 
 
 def _is_finger(source: Source, model: mujoco.MjModel, joint: int, moving: Sequence[int]) -> bool:
@@ -200,7 +191,7 @@ def _is_finger(source: Source, model: mujoco.MjModel, joint: int, moving: Sequen
     if facts is not None and facts.mimic:
         return True
     named = FINGER.search(name) or FINGER.search(model.body(body).name)
-    below = [j for j in moving if j != joint and _is_below(model, model.jnt_bodyid[j], body)]
+    below = [j for j in moving if j != joint and body in carriers(model, model.jnt_bodyid[j])]
     slides = [j for j in (joint, *below) if model.jnt_type[j] == SLIDE]
     alone = re.search(r"finger|jaw|claw|knuckle|mimic", f"{name} {model.body(body).name}", re.I)
     return bool(named and (len(slides) == 1 + len(below) or alone))
@@ -213,11 +204,8 @@ def _joint_above(model: mujoco.MjModel, joint: int, moving: Sequence[int]) -> in
     if same:
         return same[-1]
     carried = {int(model.jnt_bodyid[j]): j for j in moving}
-    while body:
-        body = model.body_parentid[body]
-        if int(body) in carried:
-            return carried[int(body)]
-    return -1
+    above = carriers(model, body)[1:]
+    return next((carried[one] for one in above if one in carried), -1)
 
 
 def _check_joint(source: Source, model: mujoco.MjModel, chain: Sequence[int]) -> None:

@@ -33,7 +33,7 @@ def room_below(
             continue
         if model.body_weldid[body] == model.body_weldid[base]:
             gear.append(_lowest(model, data, geom))
-        elif _is_part(model, body, first):
+        elif first in carriers(model, body):
             arm.append(_lowest(model, data, geom))
     return min(arm) - min(gear) if gear and arm else None
 
@@ -45,6 +45,15 @@ def tip_of(model: mujoco.MjModel, data: mujoco.MjData, last: int) -> np.ndarray:
         return data.site_xpos[model.site(END_EFFECTOR).id]
     magnet = has(model, mujoco.mjtObj.mjOBJ_BODY, MAGNET)
     return data.xpos[model.body(MAGNET).id if magnet else last]
+
+
+def carriers(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return a body and those that carry it, one after the other, without the world."""
+    found = []
+    while body:
+        found.append(int(body))
+        body = model.body_parentid[body]
+    return found
 
 
 def has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
@@ -78,12 +87,6 @@ def _hang(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     joint = model.joint(SWING)
     pivot.qpos = np.clip(angle, *joint.range) if joint.limited[0] else angle
     mujoco.mj_kinematics(model, data)
-
-
-def _is_part(model: mujoco.MjModel, body: int, of: int) -> bool:
-    while body > of:
-        body = model.body_parentid[body]
-    return body == of
 
 
 def _meets_the_world(model: mujoco.MjModel, geom: int) -> bool:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from uam_control.mission.scenarios.environment import PAYLOAD, board_height, material, thickness
-from uam_sim_bridge.plant.arm_geometry import BASE
+from uam_sim_bridge.plant.arm_geometry import BASE, carriers
 
 PLACE = "environment"  # body of parts/world.xml, before the vehicle: its contacts come first
 TYPES = mujoco.mjtGeom
@@ -168,11 +168,9 @@ def shapes(model: mujoco.MjModel, entries: Sequence[Entry]) -> dict[str, np.ndar
     names[BASE] = VEHICLE
     found: dict[str, list[int]] = {name: [] for name in names.values()}
     for geom in range(model.ngeom):
-        body = model.geom_bodyid[geom]
-        while body and model.body(body).name not in names:
-            body = model.body_parentid[body]
-        if body:
-            found[names[model.body(body).name]].append(geom)
+        carrying = (model.body(one).name for one in carriers(model, model.geom_bodyid[geom]))
+        if name := next((one for one in carrying if one in names), ""):
+            found[names[name]].append(geom)
     return {name: np.array(geoms, int) for name, geoms in found.items()}
 
 
