@@ -39,16 +39,7 @@ from uam_msgs_py.node.namespace import unlabelled
 from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
 
-# of every tick: not read in flight, to save processor time
-FAST = (topics.IMU, topics.JOINTS, topics.MOCAP, topics.SETPOINT)
-SLOW = (
-    topics.AUTOPILOT_STATE,
-    topics.AUTOPILOT_BATTERY,
-    topics.ARM_TEMPERATURE,
-    topics.MAGNET_STATE,
-    topics.PREFLIGHT,
-    topics.DIAGNOSTICS,
-)
+Readers = dict[topics.Topic, Callable[[Any], None]]
 LEVELS = {OK: GOOD, WARN: WARNING}
 SILENCE = 1.0  # [s] wall time without stamps from which on the vehicle's time goes on by itself
 HOST_PERIOD = 2.0  # [s] wall time between two readings of the computer
@@ -84,11 +75,14 @@ class Feed:
         self._magnet: bool | None = None
         self._heard: dict[str, float] = {}  # time.monotonic() of each node's diagnostics
         self._host_due = 0.0
-        self._readers: dict[topics.Topic, Callable[[Any], None]] = {
+        # of every tick: not read in flight, to save processor time
+        self._fast: Readers = {
             topics.IMU: self._on_imu,
             topics.JOINTS: self._on_joints,
             topics.MOCAP: self._on_mocap,
             topics.SETPOINT: self._on_setpoint,
+        }
+        self._slow: Readers = {
             topics.AUTOPILOT_STATE: self._on_autopilot,
             topics.AUTOPILOT_BATTERY: self._on_battery,
             topics.ARM_TEMPERATURE: self._on_temperature,
@@ -97,11 +91,11 @@ class Feed:
             topics.DIAGNOSTICS: self._on_diagnostics,
         }
         self.door = Door(node)
-        self._subscriptions = {topic: self._listen(topic) for topic in (*FAST, *SLOW)}
+        self._subscriptions = {one: self._listen(one) for one in (*self._fast, *self._slow)}
 
     def _listen(self, topic: topics.Topic) -> Subscription:
-        qos = topic.reading if topic in FAST else topic.qos
-        made = listen(self._node, topic, qos, raw=topic in FAST)
+        fast = topic in self._fast
+        made = listen(self._node, topic, topic.reading if fast else topic.qos, raw=fast)
         return self.door.guard(made, topic.name, self._rightful, lambda: self._stamp > 0.0)
 
     @property
@@ -112,12 +106,9 @@ class Feed:
     def look(self) -> Situation:
         """Take all new messages; return what the steps look at."""
         seen = self.observation
-        for topic in (*SLOW, *FAST):
-            if seen.armed and topic in FAST:
-                continue
-            inlet = self._subscriptions[topic]
-            for message in self.door.messages(inlet):
-                self.door.accepts(inlet, self._readers[topic], message)
+        self._take(self._slow)
+        if not seen.armed:
+            self._take(self._fast)
         sample, rest_time = self._sample(), self._limits().rest_time
         self._window.span = rest_time
         if sample is not None:
@@ -135,6 +126,12 @@ class Feed:
             self._host_due = time.monotonic() + HOST_PERIOD
             seen.host = self._host.read()
         return Situation(now, sample, self._magnet, seen.killed)
+
+    def _take(self, readers: Readers) -> None:
+        for topic, read in readers.items():
+            inlet = self._subscriptions[topic]
+            for message in self.door.messages(inlet):
+                self.door.accepts(inlet, read, message)
 
     def _sample(self) -> Sample | None:
         if self._pose is None or self._joints is None or not self._inertial:
