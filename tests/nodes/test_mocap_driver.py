@@ -5,13 +5,13 @@ import time
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from mocap_room import MocapRoom
 from tracked_vehicle import TrackedBody
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_pose
 from uam_sim_bridge.devices.mocap.calibration import Calibration, load, write
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
 
 MODULE, NAME = "uam_sim_bridge.nodes.mocap_driver", "mocap_driver"
 POSITION = np.array([0.5, -1.0, 1.2])
@@ -26,7 +26,7 @@ def poses(_):
 
 @pytest.fixture
 def server():
-    with MocapServer([TrackedBody("uam", pivot=PIVOT), TrackedBody("box")], poses) as made:
+    with MocapRoom([TrackedBody("uam", pivot=PIVOT), TrackedBody("box")], poses) as made:
         yield made
 
 

@@ -16,6 +16,7 @@ import pytest
 import yaml
 from arm_rig import BAUD, STOWED
 from autopilot_on_a_line import AutopilotOnALine
+from mocap_room import MocapRoom
 from servo_shafts import StillShaft
 from tracked_vehicle import TrackedBody
 
@@ -111,7 +112,7 @@ def test_each_missing_device_is_named_and_used_once_it_is_there(laboratory, tmp_
         servos = [EmulatedServo(i + 1, one, baud_rate=BAUD) for i, one in enumerate(shafts)]
         opened.enter_context(contextlib.closing(EmulatedBus(servos, link=tmp_path / "ttyARM")))
         run.until("arm: present")
-        server = MocapServer(
+        server = MocapRoom(
             [TrackedBody("uam")], lambda _: {"uam": (PLACE, LEVEL)}, Streaming(port=port)
         )
         opened.enter_context(server)

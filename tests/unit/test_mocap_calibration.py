@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mocap_room import MocapRoom
 from tracked_vehicle import RATE, STANDING, TrackedBody, ahead, moving, recorded, standing
 
 from uam_control.maths.rotations import (
@@ -19,7 +20,6 @@ from uam_lab.cli.main import main
 from uam_sim_bridge.devices.mocap import calibration as calibrations
 from uam_sim_bridge.devices.mocap import measurement
 from uam_sim_bridge.devices.mocap.calibration import fit
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError
 from uam_sim_bridge.devices.mocap.measurement import angle_between, places, still
 from uam_sim_bridge.plant import Vehicle
@@ -224,7 +224,7 @@ def test_the_command_guides_and_measures_over_real_sockets(tmp_path, capsys, mon
 
     monkeypatch.setattr("builtins.input", person)
     out, raw = tmp_path / "lab.yaml", tmp_path / "raw.csv"
-    with MocapServer([body, TrackedBody("box")], lambda _: {"uam": at[0]}) as server:
+    with MocapRoom([body, TrackedBody("box")], lambda _: {"uam": at[0]}) as server:
         # It measures for a second of the server's frames: a stalled test has all of them. Without
         # frames the wall's clock ends it.
         end = time.monotonic() + 60.0

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mocap_room import MocapRoom
 from natnet.version import Version
 from tracked_vehicle import TrackedBody
 
 from uam_sim_bridge.devices.mocap.calibration import load
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
 from uam_sim_bridge.devices.mocap.natnet_messages import UNREADABLE, read_frame, read_models
 from uam_sim_bridge.devices.mocap.natnet_source import NatNetSource
@@ -76,7 +76,7 @@ def test_counts_are_no_reason_to_read_beyond_the_end():
 def driver():
     """A driver of a server with two bodies, and the server."""
     places = {"uam": (np.zeros(3), LEVEL), "box": (np.full(3, 2.0), LEVEL)}
-    with MocapServer([TrackedBody("uam"), TrackedBody("box")], lambda _: places) as server:
+    with MocapRoom([TrackedBody("uam"), TrackedBody("box")], lambda _: places) as server:
         source = NatNetSource("127.0.0.1", server.port)
         yield MocapDriver(MocapParameters(), load("motive_y_up"), source), server
         source.close()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mocap_room import Disturbances, MocapRoom
 from natnet import NatNetClient
 from natnet.data_descriptions import DataDescriptions
 from natnet.data_frame import DataFrame
@@ -24,11 +25,7 @@ from uam_sim_bridge.devices.mocap import driver as driver_module
 from uam_sim_bridge.devices.mocap import natnet_messages
 from uam_sim_bridge.devices.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import (
-    Disturbances,
-    MocapServer,
-    Streaming,
-)
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import Streaming
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 from uam_sim_bridge.devices.mocap.library_source import LibrarySource
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters
@@ -73,7 +70,7 @@ def poses_of(truth, payload_top):
 
 def serving(names=("uam", "box"), poses=still, disturbances=None, seed=0, **how):
     bodies = [TrackedBody(name) for name in names]
-    return MocapServer(bodies, poses, Streaming(**how), disturbances, seed)
+    return MocapRoom(bodies, poses, Streaming(**how), disturbances, seed)
 
 
 @pytest.fixture
@@ -189,7 +186,7 @@ def test_the_driver_delivers_the_pose_with_the_stamp_of_its_exposure(connect, ve
 
 def test_latency_is_that_of_the_server_and_the_stamps_lie_at_the_exposure(connect):
     """By the server's stamps alone: the least delay of the network is some 0.1 ms."""
-    with serving(disturbances=Disturbances(latency=0.03)) as server:
+    with serving(latency=0.03) as server:
         driver = connect(server)
         poses(driver, 60)
     assert float(driver.values()["latency median [ms]"]) > 29.0

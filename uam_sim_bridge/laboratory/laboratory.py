@@ -26,7 +26,7 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
 )
 from uam_sim_bridge.devices.dynamixel.startup import required_mode
 from uam_sim_bridge.devices.mocap.calibration import Calibration
-from uam_sim_bridge.devices.mocap.emulated.mocap_server import Disturbances, MocapServer, Streaming
+from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.laboratory.hil_line import HilLine
@@ -104,9 +104,11 @@ class Laboratory:
         self.mocap = MocapServer(
             mistaken_room(self._bodies(), self.wiring),
             # the plant's own rate decides
-            streaming=Streaming(rate=1.0 / self.plant.period, port=p.mocap_port),
-            disturbances=Disturbances(latency=max(0.0005, latency * self.plant.period)),
-            seed=p.seed,
+            Streaming(
+                rate=1.0 / self.plant.period,
+                port=p.mocap_port,
+                latency=max(0.0005, latency * self.plant.period),
+            ),
         )
         rotors = len(self.description.rotors)
         if p.hil == LINE:

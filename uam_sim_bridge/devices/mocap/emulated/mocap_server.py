@@ -1,21 +1,15 @@
-"""An emulated NatNet server: command and data port, multicast or unicast, and its disturbances.
+"""An emulated NatNet server: command and data port, multicast or unicast.
 
-    with MocapServer([body], poses) as server:
-        server.occlude("uam")
-
-`poses(time)` returns name → (position (3,) [m, ENU], quaternion (4,) FLU → ENU) of the vehicle at
-`time` [s] of the host's clock, time.time(); a body without a pose is not tracked. Without `poses`
-the owner, a simulation, hands them over by `expose`.
+Its owner, a simulation, hands over the poses by `expose`.
 """
 
 import heapq
 import math
-import random
 import select
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, Self
 
@@ -23,7 +17,6 @@ import numpy as np
 
 from uam_sim_bridge.devices.mocap.emulated import natnet_packets as packets
 
-Poses = Callable[[float], Mapping[str, tuple[np.ndarray, np.ndarray]]]
 GROUP = "239.255.42.99"  # Motive's
 CLIENT_TIME = 10.0  # [s] without a packet after which a client gets no more frames by unicast
 LONGEST_WAIT = 0.02  # [s]
@@ -43,29 +36,12 @@ class Body(Protocol):
         """
 
 
-@dataclass
-class Disturbances:
-    """What happens to frames; may be changed while the server runs.
-
-    latency [s]: exposure to transmission; jitter [s]: mean of the delay after that, exponential;
-    loss, repeat, swap: probability per frame that it is lost, sent twice, or overtaken by the next;
-    damage: that a byte of it is changed.
-    """
-
-    latency: float = 0.004
-    jitter: float = 0.0
-    loss: float = 0.0
-    repeat: float = 0.0
-    swap: float = 0.0
-    damage: float = 0.0
-
-
 @dataclass(frozen=True)
 class Streaming:
     """How a server streams.
 
     rate [Hz]; version: NatNet's; address: of the server; port, data_port: 0 for free ones; clock:
-    offset [s] and drift of the server's.
+    offset [s] and drift of the server's; latency [s]: exposure to transmission.
     """
 
     rate: float = 120.0
@@ -75,29 +51,22 @@ class Streaming:
     port: int = 0
     data_port: int = 0
     clock: tuple[float, float] = (-1.7e9, 0.0)
+    latency: float = 0.004
 
 
 class MocapServer:
     """Serves in a thread of its own; `port`: the command port, `sent`: frames sent."""
 
-    def __init__(
-        self,
-        bodies: Sequence[Body],
-        poses: Poses | None = None,
-        streaming: Streaming | None = None,
-        disturbances: Disturbances | None = None,
-        seed: int = 0,
-    ) -> None:
-        """seed: of the disturbances. Raises OSError if a port is in use."""
+    def __init__(self, bodies: Sequence[Body], streaming: Streaming | None = None) -> None:
+        """Raises OSError if a port is in use."""
         how = streaming or Streaming()
         if how.version not in packets.VERSIONS:
             raise ValueError(f"version {how.version}; allowed: {packets.VERSIONS}")
-        self.disturbances = disturbances or Disturbances()
         self._bodies = dict(enumerate(bodies, 1))
-        self._first = {n: body.name for n, body in self._bodies.items()}  # those of `poses`
-        self._poses, self._period, self._version = poses, 1.0 / how.rate, how.version
+        self._first = {n: body.name for n, body in self._bodies.items()}  # those of the poses
+        self._period, self._version, self._latency = 1.0 / how.rate, how.version, how.latency
         self._multicast, address = how.multicast, how.address
-        self._clock, self._random = how.clock, random.Random(seed)
+        self._clock = how.clock
         self._commands = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._commands.bind((address, how.port))
         self.port = self._commands.getsockname()[1]
@@ -111,7 +80,7 @@ class MocapServer:
         self._clients: dict[tuple[str, int], float] = {}  # address → time.monotonic() [s]
         self._lock = threading.Lock()
         self._hidden: set[str] = set()
-        self._changed = self._paused = self._unplugged = False
+        self._changed = self._unplugged = False
         self._number = self.sent = 0
         self._seen: dict[int, packets.WireBody] = {}  # as Motive, which repeats the last pose
         self._due: list[tuple[float, int, bytes]] = []  # host's time [s], order, packet
@@ -154,29 +123,17 @@ class MocapServer:
                     body.name = new
             self._changed = True
 
-    def remove(self, name: str) -> None:
-        """Delete a body."""
-        with self._lock:
-            self._bodies = {n: body for n, body in self._bodies.items() if body.name != name}
-            self._seen.clear()
-            self._changed = True
-
-    def pause(self, paused: bool = True) -> None:
-        """Stop the frames, not the server."""
-        with self._lock:
-            self._paused = paused
-
     def unplug(self, unplugged: bool = True) -> None:
         """Pull the network cable: no packet arrives or leaves."""
         with self._lock:
             self._unplugged = unplugged
 
     @property
-    def state(self) -> tuple[tuple[str, ...], frozenset[str], bool, bool]:
-        """Return names of the bodies, the hidden ones, whether paused, whether unplugged."""
+    def state(self) -> tuple[tuple[str, ...], frozenset[str], bool]:
+        """Return names of the bodies, the hidden ones, whether unplugged."""
         with self._lock:
             names = tuple(body.name for body in self._bodies.values())
-            return names, frozenset(self._hidden), self._paused, self._unplugged
+            return names, frozenset(self._hidden), self._unplugged
 
     def expose(self, host: float, poses: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> bool:
         """Expose at `host` [s], host's clock, if the rate allows it; return whether it does.
@@ -201,16 +158,11 @@ class MocapServer:
         return (host + offset) * (1.0 + drift)
 
     def _run(self) -> None:
-        due = math.inf if self._poses is None else time.time()
         while not self._ended.is_set():
-            now = time.time()
-            if now >= due:
-                due = max(due + self._period, now - self._period)
-                self._expose(now, self._poses(now))
             with self._lock:
-                self._send_due(now)
-            soonest = min(due, self._due[0][0] if self._due else due)
-            wait = min(max(soonest - time.time(), 0.0), LONGEST_WAIT)
+                self._send_due(time.time())
+            left = self._due[0][0] - time.time() if self._due else LONGEST_WAIT
+            wait = min(max(left, 0.0), LONGEST_WAIT)
             ready = select.select([self._commands, self._woken], [], [], wait)[0]
             if self._commands in ready:
                 self._answer()
@@ -242,8 +194,6 @@ class MocapServer:
     def _expose(self, now: float, poses: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
         """Make the frame of an exposure at `now` [s], host's clock, and plan its transmission."""
         with self._lock:
-            if self._paused:
-                return
             self._number += 1
             for number, body in self._bodies.items():
                 pose = None if body.name in self._hidden else poses.get(self._first[number])
@@ -256,25 +206,19 @@ class MocapServer:
             self._plan(now)
 
     def _plan(self, now: float) -> None:
-        """Plan the transmission of the present frame, with what happens to it."""
-        d, chance = self.disturbances, self._random.random
-        sent = now + d.latency
+        """Plan the transmission of the present frame."""
+        sent = now + self._latency
         stamps = packets.Stamps(
-            *map(self.server_time, (now, now + 0.3 * d.latency, sent)),
+            *map(self.server_time, (now, now + 0.3 * self._latency, sent)),
         )
         data = packets.frame(self._version, self._number, stamps, self._seen, self._changed)
         self._changed = False
-        if chance() < d.damage:
-            at = self._random.randrange(4, len(data))
-            data = data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :]
-        if chance() < d.loss:
-            return
-        arrival = sent + (self._random.expovariate(1.0 / d.jitter) if d.jitter else 0.0)
-        if chance() < d.swap:
-            arrival += 1.5 * self._period
-        for _ in range(2 if chance() < d.repeat else 1):
-            self._order += 1
-            heapq.heappush(self._due, (arrival, self._order, data))
+        self._send_at(sent, data)
+
+    def _send_at(self, due: float, data: bytes) -> None:
+        """Send a packet at `due` [s], host's time."""
+        self._order += 1
+        heapq.heappush(self._due, (due, self._order, data))
 
     def _send_due(self, now: float) -> None:
         while self._due and self._due[0][0] <= now:
