@@ -349,7 +349,7 @@ def test_a_zero_near_the_end_of_the_turn_is_read_in_the_right_turn():
 @given(st.integers(0, 1000), st.sampled_from([1e-4, 1e-3]), st.sampled_from([0.0, 0.02]))
 def test_with_bit_errors_and_losses_every_reading_is_right(seed, rate, loss):
     rig = ArmRig(seed=seed).start()
-    rig.line.faults.bit_error_rate, rig.line.faults.loss = rate, loss
+    rig.line.bit_error_rate, rig.line.loss = rate, loss
     right = 0
     for _ in range(60):
         reading = rig.cycle(1, effort=[0.4, -0.4])

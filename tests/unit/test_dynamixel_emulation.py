@@ -247,7 +247,7 @@ def test_another_baud_rate_is_not_understood(line, bus):
 @pytest.mark.parametrize("rate", [1e-4, 1e-3, 1e-2])
 def test_bit_errors_never_give_a_wrong_value(line, bus, rate):
     """What passes the CRC is right; the share of the rest agrees with the rate."""
-    line.faults.bit_error_rate = rate
+    line.bit_error_rate = rate
     span, right = TABLE.span("Present Current", "Present Position"), 0
     expected = line.servos[0].read(span.address, span.size)[1]
     for _ in range(400):
@@ -262,7 +262,7 @@ def test_lost_packets_are_lost_by_the_seed(clock):
     def answered(seed):
         servo = EmulatedServo(1, StillShaft(), baud_rate=BAUD, clock=clock)
         line = ServoLine([servo], seed)
-        line.faults.loss = 0.3
+        line.loss = 0.3
         bus = raw_bus(line)
         return [bool(bus.sync_read(TORQUE, [1], False)) for _ in range(40)]
 

@@ -260,7 +260,7 @@ def test_each_cable_is_pulled_and_plugged_in_again(laboratory, name):
         line = lab.bus.line
         return (
             *(lab.parameters.places / device in lab.parameters.places.iterdir() for device in PTYS),
-            *([one.connected for one in line.servos], line.faults.bit_error_rate),
+            *([one.connected for one in line.servos], line.bit_error_rate),
             *(lab.cable.cut, lab.cable.bit_error_rate, lab.magnet_plugged, lab.hil_plugged),
             *(lab.imu_plugged, [one.temperature for one in lab.servos]),
             *([one.alert for one in lab.servos], lab.mocap.state),

@@ -69,7 +69,7 @@ class BusBitErrors(CableFault):
     rate: float = number(1e-4, "fraction of wrong bits", "1", 0.0, 0.1)
 
     def pull(self, lab: Any, on: bool) -> None:
-        lab.bus.line.faults.bit_error_rate = self.rate if on else 0.0
+        lab.bus.line.bit_error_rate = self.rate if on else 0.0
 
 
 class ServoOverheating(JointFault):

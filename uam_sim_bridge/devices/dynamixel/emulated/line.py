@@ -11,7 +11,6 @@ import select
 import termios
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,19 +29,10 @@ _SPEEDS = {
 }
 
 
-@dataclass
-class BusFaults:
-    """Faults of the line; may be changed while it is used.
-
-    bit_error_rate: of every bit in both directions; loss: of a whole packet in either direction.
-    """
-
-    bit_error_rate: float = 0.0
-    loss: float = 0.0
-
-
 class ServoLine:
     """Servos on one line; `instructions`: packets understood.
+
+    `bit_error_rate`: of every bit in both directions; `loss`: of a whole packet in either one.
 
     Servos of one id answer at the same time: their bytes overlap and are damaged. In a Sync Read a
     servo waits for the one named before it; if that one is silent, so are all after it.
@@ -50,7 +40,8 @@ class ServoLine:
 
     def __init__(self, servos: Sequence[EmulatedServo], seed: int = 1) -> None:
         """seed: of the faults."""
-        self.servos, self.faults, self.instructions = list(servos), BusFaults(), 0
+        self.servos, self.instructions = list(servos), 0
+        self.bit_error_rate = self.loss = 0.0
         self._noise = np.random.default_rng(seed)
         self._reader = PacketReader()
 
@@ -94,11 +85,11 @@ class ServoLine:
             one.connected = True
 
     def _lost(self) -> bool:
-        return self.faults.loss > 0.0 and self._noise.random() < self.faults.loss
+        return self.loss > 0.0 and self._noise.random() < self.loss
 
     def _disturbed(self, data: bytes) -> bytes:
         """Return `data` with bit errors."""
-        return disturbed(data, self.faults.bit_error_rate, self._noise)
+        return disturbed(data, self.bit_error_rate, self._noise)
 
     def _answers(self, packet: Packet, listening: list[EmulatedServo]) -> list[tuple[float, bytes]]:
         """Execute an instruction; return (delay [s], bytes) of each status packet."""
