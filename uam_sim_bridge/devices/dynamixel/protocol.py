@@ -13,7 +13,7 @@ BROADCAST = 0xFE
 LAST_ID = 0xFC
 SHORTEST, LONGEST = 3, 1024  # value of the length field
 
-PING, READ, WRITE, REG_WRITE, ACTION, REBOOT = 0x01, 0x02, 0x03, 0x04, 0x05, 0x08
+PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08
 STATUS, SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x55, 0x82, 0x83, 0x8A
 
 # Error field of a status packet

@@ -131,11 +131,6 @@ class ServoLine:
             return protocol.status(own, error, data) if level >= 1 else None
         if code == protocol.WRITE:
             error = servo.write(_word(p), p[2:])
-        elif code == protocol.REG_WRITE:
-            error = servo.register(_word(p), p[2:])
-        elif code == protocol.ACTION:
-            servo.act()
-            error = servo.alert
         elif code == protocol.REBOOT:
             error = servo.alert
             servo.restart()

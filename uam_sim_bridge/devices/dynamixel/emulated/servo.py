@@ -70,7 +70,6 @@ class EmulatedServo:
         self._memory = bytearray(max(one.end for one in self.table.registers.values()))
         self._heard = clock()
         self._shut_down = False
-        self._registered: tuple[int, bytes] | None = None
         for name, value in DEFAULTS.items():
             if name in self.table.registers:
                 self.set(name, value)
@@ -121,7 +120,7 @@ class EmulatedServo:
     def restart(self) -> None:
         """Reboot, or power lost and back: EEPROM stays, errors and torque are off."""
         self._memory[FIRST_RAM:] = self._volatile
-        self._shut_down, self._registered = False, None
+        self._shut_down = False
         self._drive()
 
     def tick(self, heard: bool) -> None:
@@ -162,17 +161,6 @@ class EmulatedServo:
         if any(name in (*GOALS, names.TORQUE_ENABLE, names.BUS_WATCHDOG) for name in touched):
             self._drive()
         return self.alert
-
-    def register(self, address: int, data: bytes) -> int:
-        """Keep a Reg Write until `act`."""
-        self._registered = address, data
-        return self.alert
-
-    def act(self) -> None:
-        """Execute the kept Reg Write."""
-        if self._registered is not None:
-            self.write(*self._registered)
-            self._registered = None
 
     def _touched(self, address: int, length: int) -> dict[str, Register]:
         """Return the registers that a write overlaps."""
