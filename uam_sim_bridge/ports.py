@@ -88,16 +88,8 @@ def bound(protocol: str, host: str, port: int, purpose: str) -> socket.socket:
     return opened
 
 
-def discovery_port(domain: int, participant: int = 0) -> int:
-    """Return the UDP port of a participant's discovery traffic (RTPS 2.2, 9.6.1.1).
-
-    The participant's other traffic uses the next port.
-    """
-    return 7400 + 250 * domain + 10 + 2 * participant
-
-
 def is_discovery_port(port: int) -> bool:
-    """Return whether a port of the middleware is a discovery port (see `discovery_port`)."""
+    """Return whether a port of the middleware is a discovery port (RTPS 2.2, 9.6.1.1): even."""
     return port % 2 == 0
 
 

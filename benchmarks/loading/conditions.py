@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_lab.flights.processes.node_environment import ros_environment
-from uam_sim_bridge.ports import discovery_port, in_use
+from uam_sim_bridge.ports import in_use
 
 BLOCK = 8_000_000  # bytes
 BLOCKS = 16  # per file, before it is overwritten
@@ -51,7 +51,8 @@ def writer(folder: Path, domain: int) -> None:
 
 def listener(folder: Path, domain: int) -> None:
     """Receive every message of /diagnostics, after the start of the flight."""
-    while not in_use(socket.SOCK_DGRAM, discovery_port(domain)):
+    first = 7410 + 250 * domain  # of a participant's discovery: RTPS 2.2, 9.6.1.1
+    while not in_use(socket.SOCK_DGRAM, first):
         time.sleep(WAIT)
     os.environ.update(ros_environment(domain, folder))
     import rclpy

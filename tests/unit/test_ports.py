@@ -101,7 +101,7 @@ def test_a_ros_program_in_the_domain_does_not_move_a_flight(tmp_path):
     """A ros2 daemon holds the discovery port of the domain that its user works in."""
     instance = 37  # not used by flights beside this test
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as daemon:
-        daemon.bind(("127.0.0.1", ports.discovery_port(ports.ports_of(instance).domain)))
+        daemon.bind(("127.0.0.1", 7410 + 250 * ports.ports_of(instance).domain))
         with Reservation(instance, folder=tmp_path) as flight:
             assert flight.ports == ports.ports_of(instance)
 
