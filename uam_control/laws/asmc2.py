@@ -12,10 +12,8 @@ the disturbance:
 
 t starts at the reset of the law: at take-off; for the arm, when its controller starts on the
 ground. |eta| is clamped at 0.98 in every term (e then counts as 0.98 rho). The law counts the
-clamped axes of all ticks. Mhat is diagonal. The law's own Ghat is 0: the position controller adds
-the weight to tau_p for every law (`gravity_feedforward_mass`), and no law compensates the weight
-of the arm. For the attitude, e and e_dot are the errors on SO(3), eq. (14) and (15). These
-equations are not in the paper.
+clamped axes of all ticks. Mhat is diagonal; Ghat, and the errors of the attitude: as in `asmc1`.
+These equations are not in the paper.
 """
 
 import math

@@ -88,14 +88,7 @@ class HandPoints(Goal):
     times: np.ndarray
     wanted: np.ndarray
     rates: np.ndarray
-    columns = BOTH
-
-    def equals(self, other: HandPoints) -> bool:
-        """Return whether both are the same trajectory."""
-        pairs = (self.times, other.times), (self.wanted, other.wanted), (self.rates, other.rates)
-        return self.wanted.shape == other.wanted.shape and all(
-            np.allclose(a, b, 0.0, SAME, equal_nan=True) for a, b in pairs
-        )
+    columns, compared = BOTH, ("times", "wanted", "rates")
 
     @property
     def closed(self) -> bool:

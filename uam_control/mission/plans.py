@@ -179,6 +179,7 @@ class Goal:
     columns: slice
     closed = False
     still = False  # whether it asks for no motion, so that it only ends one
+    compared: tuple[str, ...] = ()  # arrays that equal goals have alike
     note = ""  # of the answer, what is changed of what was asked for
 
     def solved(self, reference: np.ndarray, p: MissionParameters, ground: float) -> Goal:
@@ -190,7 +191,11 @@ class Goal:
 
     def equals(self, other: Goal) -> bool:
         """Return whether another goal of this type is the same."""
-        return False
+        pairs = [(getattr(self, name), getattr(other, name)) for name in self.compared]
+        same = (
+            a.shape == b.shape and np.allclose(a, b, 0.0, SAME, equal_nan=True) for a, b in pairs
+        )
+        return bool(pairs) and all(same)
 
     def check(self, reference: np.ndarray, p: MissionParameters) -> None:
         """Raise PlanRefused for what cannot be planned from reference (3, 6 + n)."""
@@ -267,13 +272,7 @@ class Points(Goal):
     points: np.ndarray
     columns: slice
     asked: Goal | None = None  # the goal that it solves
-
-    def equals(self, other: Points) -> bool:
-        """Return whether both are the same trajectory."""
-        if self.points.shape != other.points.shape:
-            return False
-        pairs = ((self.times, other.times), (self.points, other.points))
-        return all(np.allclose(a, b, 0.0, SAME, equal_nan=True) for a, b in pairs)
+    compared = "times", "points"
 
     @property
     def closed(self) -> bool:

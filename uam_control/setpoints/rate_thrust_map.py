@@ -231,9 +231,6 @@ class RateThrustMap:
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
         three = self.rates
         self._map = prepared(rate_thrust_map, three, three, three, three, self.flat, three)
-        self._map_state = prepared(
-            rate_thrust_of_state, three, three, np.zeros((3, ALPHA)), self.flat, three
-        )
 
     def configure(self, parameters: RateThrustParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
@@ -266,14 +263,9 @@ class RateThrustMap:
         ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
         """
         thrust = self._map(tau_p, tau_q, attitude, body_rates, self.flat, self.rates)
-        return self.rates, _accepted(thrust)
-
-    def map_state(
-        self, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray
-    ) -> tuple[np.ndarray, float]:
-        """Return `map` of the attitude and body rates in state (3, 6 + n), see `coordinates`."""
-        thrust = self._map_state(tau_p, tau_q, state, self.flat, self.rates)
-        return self.rates, _accepted(thrust)
+        if thrust < 0.0:
+            raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
+        return self.rates, thrust
 
     def normalised(self, tau_q: np.ndarray, thrust: float) -> np.ndarray:
         """Return tau_q (3,) [N m, FLU] in parts of the largest torque, at the normalised thrust."""
@@ -286,10 +278,3 @@ class RateThrustMap:
         p = self.flat
         curves = p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]
         return command_of_thrust(factor * thrust_of_command(command, *curves), *curves)
-
-
-def _accepted(thrust: float) -> float:
-    """Return a thrust of `rate_thrust_map`; raises SetpointRefused if it names a bad input."""
-    if thrust < 0.0:
-        raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
-    return thrust

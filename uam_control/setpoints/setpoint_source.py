@@ -135,7 +135,8 @@ class SetpointSource:
             return self._present(now, situation)
         if flying and tau_q is not None:
             try:
-                rates, thrust = self.map.map_state(tau_p, tau_q, state)
+                attitude_now, gyro = state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
+                rates, thrust = self.map.map(tau_p, tau_q, attitude_now, gyro)
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:

@@ -84,7 +84,8 @@ class StageArrays(NamedTuple):
 class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
-    All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
+    All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before:
+    `mocap` and `joints` are `take_pose` and `take_readings` of this stage.
     `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
     `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
     `StateEstimator.bias_known`; `state` (3, 6 + n): of the newest tick;
@@ -108,8 +109,8 @@ class EstimatorStage:
         self.arrays = a = StageArrays(self.estimator.arrays, *self._own)
         self.state, *_ = arrays_of(a.estimator.memory)
         sample, angles = np.zeros(3), np.zeros(joints)
-        self._pose = bound(take_pose, a, 0, sample, np.zeros(4))
-        self._readings = bound(take_readings, a, 0, angles, angles)
+        self.mocap = bound(take_pose, a, 0, sample, np.zeros(4))
+        self.joints = bound(take_readings, a, 0, angles, angles)
         self._sample = bound(take_sample, a, 0, sample, sample)
 
     @property
@@ -125,14 +126,6 @@ class EstimatorStage:
     def held_back(self) -> bool:
         """Return whether no states come because the estimate has diverged."""
         return self.diverged > 0 and self.stamp < self.held_until
-
-    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """See `take_pose`."""
-        self._pose(stamp, position, quaternion)
-
-    def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """See `take_readings`."""
-        self._readings(stamp, alpha, alpha_dot)
 
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
         """Take an IMU sample: see `take_sample`.

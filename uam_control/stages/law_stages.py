@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -35,7 +35,8 @@ POSITION, ATTITUDE, ARM = range(3)  # numbers in SUBSYSTEMS
 class MeasuredDelay:
     """The loop delay that the bridge reports, for the attitude law of a later tick.
 
-    A report is used when it has arrived in every engine, REPORT_DELAY after its stamp.
+    A report is used when it has arrived in every engine, REPORT_DELAY after its stamp. `apply`:
+    `apply_reports` of these arrays.
     """
 
     def __init__(self, controller: AttitudeController) -> None:
@@ -44,7 +45,7 @@ class MeasuredDelay:
         # stamp [ns] and loop delay [s] of each
         self._reports = record("stamp", "loop_delay", MOST_REPORTS)
         self.arrays = self.memory, self._reports, controller.prediction
-        self._apply = prepared(apply_reports, *self.arrays, 0)
+        self.apply = partial(prepared(apply_reports, *self.arrays, 0), *self.arrays)
 
     def report(self, stamp: int, loop_delay: float | None) -> None:
         """Take the report of the tick `stamp` [ns]; loop_delay [s], None: unknown."""
@@ -53,10 +54,6 @@ class MeasuredDelay:
             m.count = 0
         self._reports[m.count] = stamp, math.nan if loop_delay is None else loop_delay
         m.count, m.newest = m.count + 1, stamp
-
-    def apply(self, stamp: int) -> None:
-        """See `apply_reports`."""
-        self._apply(*self.arrays, stamp)
 
 
 @borrowing
@@ -82,7 +79,7 @@ class LawStage:
     """One controller and its time steps.
 
     `gains_due`: whether to publish the adapted gains of the last tick, for the recording and the
-    supervisor.
+    supervisor; `begin`: `step_to` of this stage.
     """
 
     gains_due = Flag()
@@ -92,7 +89,7 @@ class LawStage:
         # [ns]: control period, stamp of the last tick, begin of its period of the gains
         self.memory = record("gains_due period last begun")
         self.memory[0] = False, timing.period, NEVER, 0
-        self._step = prepared(step_to, self.memory, 0)
+        self.begin = partial(prepared(step_to, self.memory, 0), self.memory)
 
     def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
         """Return tau of the controller at the tick `stamp` [ns].
@@ -100,10 +97,6 @@ class LawStage:
         inputs: those of the controller's `update`, without dt: see `step_to`.
         """
         return self.controller.update(*inputs, self.begin(stamp))
-
-    def begin(self, stamp: int) -> float:
-        """Begin the tick `stamp` [ns]; see `step_to`."""
-        return self._step(self.memory, stamp)
 
 
 @borrowing

@@ -10,6 +10,7 @@ from uam_control.ages import FORWARDED
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT
 from uam_control.estimation.pose_clock import counts, new_clock, no_pose, repeated
 from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import put, record
 from uam_control.setpoints.targets import VisionPose
 from uam_control.settings.parameter_set import ParameterSet, number
@@ -48,6 +49,7 @@ class VisionPacing:
     """Stores the newest pose and sends it when the interval has passed.
 
     PX4 recommends 30 to 50 Hz: a higher rate does not improve its EKF and loads a serial line.
+    `take`: `take_pose` of these arrays.
     """
 
     def __init__(self, parameters: VisionParameters) -> None:
@@ -57,14 +59,8 @@ class VisionPacing:
         self._deviations = p.vision_position_deviation, p.vision_attitude_deviation
         self._unknown = np.full((3, ALPHA), math.nan)
         still = np.zeros(3)
-        self._take = prepared(take_pose, self.arrays, 0.0, still, np.zeros(4), True)
+        self.take = bound(take_pose, self.arrays, 0.0, still, np.zeros(4), True)
         self._due = prepared(pose_due, self.arrays, 0.0, self._unknown, True)
-
-    def take(
-        self, exposed: float, position: np.ndarray, quaternion: np.ndarray, armed: bool
-    ) -> bool:
-        """See `take_pose`."""
-        return self._take(self.arrays, exposed, position, quaternion, armed)
 
     def send(self, autopilot: AutopilotPort, now: float, state: np.ndarray | None) -> None:
         """Send the newest pose if it is due at `now` [s], see `pose_due`.

@@ -234,7 +234,8 @@ class Checks:
             level = monitor.update(stamp, value, limits, after, p.clear_after, p.hysteresis)
             rank = level, not check.blind
             if level and (worst is None or rank > (worst.level, not worst.blind)):
-                cause = _cause(check, monitor.largest, limits[level - 1])
+                value, limit = (check.sign * one for one in (monitor.largest, limits[level - 1]))
+                cause = check.form.format(name=check.name, value=value, limit=limit)
                 worst = ExceededLimit(level, cause, check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
@@ -249,10 +250,6 @@ class Checks:
             lowest = min(*limits, self._limit(check, check.start))
             if not check.in_flight and lowest < NONE:
                 yield check, value, lowest
-
-
-def _cause(check: Check, value: float, limit: float) -> str:
-    return check.form.format(name=check.name, value=check.sign * value, limit=check.sign * limit)
 
 
 @borrowing

@@ -87,6 +87,12 @@ class Joint:
     stowed: float
 
 
+def servo_of(numbers: dict[str, Any], joint: int) -> dict[str, Any]:
+    """Return the entries of `servos` in a description's numbers for a joint, counted from 0."""
+    entries = numbers["servos"].items()
+    return {key: one[joint] if isinstance(one, list) else one for key, one in entries}
+
+
 @dataclass(frozen=True)
 class VehicleDescription:
     """The content of the file config/vehicle/NAME.yaml.
@@ -180,8 +186,7 @@ class VehicleDescription:
 
     def servo_numbers(self, joint: int) -> dict[str, Any]:
         """Return the entries of `servos` for a joint, counted from 0."""
-        entries = self.numbers["servos"].items()
-        return {key: one[joint] if isinstance(one, list) else one for key, one in entries}
+        return servo_of(self.numbers, joint)
 
     def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return px, py, km, each (rotors,) [m], in PX4's convention and motor order.

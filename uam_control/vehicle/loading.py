@@ -280,13 +280,3 @@ def merged(servos: list[Section]) -> dict[str, Any]:
         values = [one.values[key] for one in servos]  # not asked for: an unknown one is refused
         entries[key] = values[0] if all(one == values[0] for one in values) else values
     return entries
-
-
-def apart(
-    numbers: dict[str, Any], joints: int, where: str, error: type[ValueError]
-) -> list[Section]:
-    """Return the entries of each joint of what `merged` returns; where, error: see `Section`."""
-    return [
-        Section({k: v[i] if isinstance(v, list) else v for k, v in numbers.items()}, where, error)
-        for i in range(joints)
-    ]

@@ -17,7 +17,7 @@ from uam_control.profiles.profile import (
     profile_of,
 )
 from uam_control.settings.section import Section
-from uam_control.vehicle.loading import apart
+from uam_control.vehicle.description import servo_of
 from uam_control.vehicle.plant_numbers import NOT_OF_THE_PLANT, check_plant_numbers
 from uam_lab.records.results.metrics import plain
 
@@ -140,7 +140,8 @@ def checked_changes(given: Mapping[str, Any], numbers: Mapping[str, Any]) -> dic
             entry[last] = found[name]
     if found.keys() - {EFFECTS}:
         where = f"{WHERE} servos"
-        servos = apart(changed["servos"], len(changed["joints"]), where, SettingsError)
+        joints = range(len(changed["joints"]))
+        servos = [Section(servo_of(changed, i), where, SettingsError) for i in joints]
         check_plant_numbers(Section(changed, WHERE, SettingsError), servos)
     return found
 

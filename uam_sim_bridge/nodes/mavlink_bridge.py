@@ -357,7 +357,7 @@ class MavlinkBridgeNode(UamNode):
         """Compile the functions of a tick before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         state = np.zeros((3, len(self._vehicle.coordinates)))
-        spare.map_state(zero, zero, state)
+        spare.map(zero, zero, zero, zero)
         for setpoint in SETPOINTS.values():
             setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
         measured = FlightMeasurements(

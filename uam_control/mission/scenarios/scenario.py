@@ -60,18 +60,11 @@ class Grip:
     switches: tuple[tuple[float, bool], ...]
     rests: tuple[Move, ...]
 
-    def switched(self, begin: float) -> tuple[tuple[float, bool], ...]:
-        """Return the switches of a trajectory that begins at mission time `begin` [s]."""
-        return tuple((begin + at, on) for at, on in self.switches)
-
-    def moves(self, begin: float) -> tuple[Move, ...]:
-        """Return the moves of a trajectory that begins at mission time `begin` [s]."""
-        return tuple(replace(m, start=begin + m.start, end=begin + m.end) for m in self.rests)
-
-    def slowed(self, factor: float) -> Grip:
-        """Return the grip of a trajectory that takes `factor` times as long."""
-        slower = (replace(m, start=factor * m.start, end=factor * m.end) for m in self.rests)
-        return Grip(tuple((factor * at, on) for at, on in self.switches), tuple(slower))
+    def timed(self, begin: float = 0.0, factor: float = 1.0) -> Grip:
+        """Return the grip `factor` times as slow, in a time that is `begin` [s] at the begin."""
+        ends = ((begin + factor * m.start, begin + factor * m.end) for m in self.rests)
+        moves = (replace(m, start=a, end=b) for m, (a, b) in zip(self.rests, ends, strict=True))
+        return Grip(tuple((begin + factor * at, on) for at, on in self.switches), tuple(moves))
 
 
 @dataclass(frozen=True)
@@ -113,7 +106,7 @@ class Scenario:
     @property
     def motions(self) -> tuple[Move, ...]:
         """Return the moves from rest to rest, also those along a route with a grip."""
-        return self.moves if self.grip is None else self.grip.moves(self.trajectory_begins)
+        return self.moves if self.grip is None else self.grip.timed(self.trajectory_begins).rests
 
     @property
     def trajectory_begins(self) -> float:
@@ -156,7 +149,7 @@ class Scenario:
             return self
         route = self.route and self.route.slowed(factor)
         if route is not None and self.route_at is None:
-            slower = self.grip and self.grip.slowed(factor)
+            slower = self.grip and self.grip.timed(factor=factor)
             return replace(self, grip=slower).along(route)
 
         def later(pairs: tuple) -> tuple:
@@ -246,4 +239,4 @@ def routed(scenario: Scenario, legs: tuple[Leg, ...]) -> Scenario:
     found = replace(scenario, phases=phases, landing=landing)
     if scenario.grip is None:
         return found
-    return replace(found, magnet=scenario.grip.switched(found.trajectory_begins))
+    return replace(found, magnet=scenario.grip.timed(found.trajectory_begins).switches)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uam_control.control.hand_steering import FADE
-from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, Z
+from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.frames import swap_body
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import CONTROLLERS, Profile
@@ -161,7 +161,8 @@ def _laws(
         for stage in stages:
             stage(control)
         tau_q = signals.tau_q
-        sent, thrust = setpoints.map_state(signals.tau_p, tau_q, signals.state)
+        now = signals.state[CHI, ATTITUDE], signals.state[CHI_DOT, ATTITUDE]
+        sent, thrust = setpoints.map(signals.tau_p, tau_q, *now)
         if wrench:
             sent = setpoints.normalised(tau_q, thrust)
         return np.concatenate([sent, [thrust], signals.tau_alpha])
