@@ -146,12 +146,6 @@ def test_encoders_count(sign):
     np.testing.assert_allclose(velocity, sign * np.array([0.5, 0.0, 1.25]))
 
 
-def test_a_sample_may_be_later_than_usual_and_none_overtakes_it():
-    line = Delay(2)
-    given = [(0, ("a",), 3), (1, ("b",), 0), (3, None, 0), (5, None, 0), (5, None, 0)]
-    assert [line(*one) for one in given] == [None, None, None, ("a",), ("b",)]
-
-
 def test_a_pose_may_be_later_than_usual_and_several_arrive_in_their_order():
     mocap, got = rig(), []
     for tick, late in enumerate((3, 0, None, None, None, None)):

@@ -78,13 +78,10 @@ class Delay:
         self.ticks = ticks
         self.queue: deque[tuple[int, tuple]] = deque()  # tick at which it is due, sample
 
-    def __call__(self, tick: int, sample: tuple | None, added: int = 0) -> tuple | None:
-        """Store the sample taken at `tick`, if any; return the sample due by then, or None.
-
-        added: ticks by which this sample is later than usual.
-        """
+    def __call__(self, tick: int, sample: tuple | None) -> tuple | None:
+        """Store the sample taken at `tick`, if any; return the sample due by then, or None."""
         if sample is not None:
-            self.queue.append((tick + self.ticks + added, sample))
+            self.queue.append((tick + self.ticks, sample))
         if self.queue and self.queue[0][0] <= tick:
             return self.queue.popleft()[1]
         return None
