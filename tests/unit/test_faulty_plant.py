@@ -20,7 +20,7 @@ HOVER = np.full(4, 0.62)
 
 def plant_with(text):
     plant = make_plant(*START, read_schedule([text], SCENARIO, 5))
-    plant.mission_at(0.0, 0.0, "take-off")
+    plant.timeline.mission_at(0.0, 0.0, "take-off")
     return plant
 
 
@@ -249,7 +249,7 @@ def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
         1,
     )
     plant = make_plant(*START, both)
-    plant.mission_at(0.0, 0.0, "take-off")
+    plant.timeline.mission_at(0.0, 0.0, "take-off")
     efficiency = {}
     while plant.time < 0.4:
         plant.sense()
@@ -286,7 +286,7 @@ def test_gusts_go_on_around_the_wind_that_a_fault_adds():
     added = make_plant(
         gusty, 0.2, 3, (0.3, 0.4), read_schedule(["wind_gust@0.1:speed=5,rise=0"], SCENARIO, 1)
     )
-    added.mission_at(0.0, 0.0, "take-off")
+    added.timeline.mission_at(0.0, 0.0, "take-off")
     run(usual, 0.4)
     run(added, 0.4)
     np.testing.assert_allclose(added.physics.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
@@ -295,7 +295,7 @@ def test_gusts_go_on_around_the_wind_that_a_fault_adds():
 def test_nothing_happens_before_the_mission_begins():
     plant = make_plant(*START, read_schedule(["mocap_dropout@0"], SCENARIO, 1))
     assert len(poses(run(plant, 0.2))) > 10
-    plant.mission_at(0.2, 0.0, "take-off")
+    plant.timeline.mission_at(0.2, 0.0, "take-off")
     assert poses(run(plant, 0.4)) == []
     assert plant.timeline.records == [
         {"fault": "mocap_dropout", "begin_s": 0.0, "end_s": None, "parameters": {}}
@@ -369,7 +369,7 @@ ANOTHER = "rigid_body_plant:RigidBodyPlant"
 def test_faults_of_sensors_and_commands_work_with_the_plant_of_any_engine():
     frozen = read_schedule([f"mocap_freeze@{BEGIN}+{END - BEGIN:g}"], SCENARIO, 1)
     plant = make_plant(*START, frozen, ANOTHER)
-    plant.mission_at(0.0, 0.0, "take-off")
+    plant.timeline.mission_at(0.0, 0.0, "take-off")
     found = poses(during(run(plant, motors=np.ones(4))))
     assert len(found) > 15 and all(equal(pose[1:], found[0][1:]) for pose in found)
     usual = poses(during(run(make_plant(*START, Schedule(), ANOTHER), motors=np.ones(4))))

@@ -43,7 +43,7 @@ class Line:
 def faulty(*texts):
     line = Line()
     transport = FaultyTransport(line, read_schedule(texts, SCENARIO, 1))
-    transport.mission_at(10.0, 0.0, "take-off")
+    transport.timeline.mission_at(10.0, 0.0, "take-off")
     return line, transport
 
 

@@ -67,7 +67,7 @@ def _physical(faults: Schedule) -> list[str]:
 
 
 class FaultyPlant(Plant):
-    """A plant with faults that begin and end at mission times; `mission_at` sets the time.
+    """A plant with faults that begin and end at the mission times of `timeline`.
 
     `physics`: the plant that it changes. `senses`, `acts`: whether it changes samples, and
     commands or physics, until the next fault begins or ends.
@@ -99,10 +99,6 @@ class FaultyPlant(Plant):
     @tick.setter
     def tick(self, tick: int) -> None:
         self._physics.tick = tick
-
-    def mission_at(self, stamp: float, time: float, phase: str) -> None:
-        """See `Timeline.mission_at`."""
-        self.timeline.mission_at(stamp, time, phase)
 
     def sense(self) -> Samples:
         """Return the samples of the inner plant, changed by the active faults."""

@@ -174,7 +174,7 @@ class MavlinkBridgeNode(UamNode):
     def note_mission(self, stamp: int, time: float, phase: str) -> None:
         """Note mission time [s] and phase at `stamp` [ns], by which faults of the link begin."""
         if self._faulty is not None:
-            self._faulty.mission_at(stamp / SECOND, time, phase)
+            self._faulty.timeline.mission_at(stamp / SECOND, time, phase)
 
     def _on_kill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Stop the motors at the second call within kill_confirmation."""

@@ -258,7 +258,7 @@ class Simulator:
                 self._lockstep.wait(self._stamp, self._begun, self.plant.time)
             if self._faulty:
                 stamp, mission = self.answers.mission_stamp * 1e-9, self.answers.mission
-                self._faulty.mission_at(stamp, mission.time, mission.phase)
+                self._faulty.timeline.mission_at(stamp, mission.time, mission.phase)
             if (fingers := self.answers.fingers) is not None and fingers.commanded:
                 self.plant.open_to(fingers.opening)
             try:

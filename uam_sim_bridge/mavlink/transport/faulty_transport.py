@@ -84,34 +84,30 @@ class LateTransport(WaitingTransport):
 class FaultyTransport(WaitingTransport):
     """Wraps a transport; loses, delays and corrupts packets at the times of a schedule.
 
-    `mission_at` passes the mission time. `send` returns True also for a packet that a fault loses:
-    a real sender does not detect the loss.
+    `timeline`: their times, which need that of the mission. `send` returns True also for a packet
+    that a fault loses: a real sender does not detect the loss.
     """
 
     def __init__(self, inner: Transport, schedule: Schedule) -> None:
         """schedule: link faults only."""
         super().__init__(inner)
-        self._timeline = Timeline(schedule)
+        self.timeline = Timeline(schedule)
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
         self._incoming: deque[tuple[float, bytes]] = deque()
-
-    def mission_at(self, stamp: float, time: float, phase: str) -> None:
-        """See `Timeline.mission_at`."""
-        self._timeline.mission_at(stamp, time, phase)
 
     def update(self, stamp: float) -> list[FaultState]:
         """See `WaitingTransport`; return the faults that began or ended."""
         super().update(stamp)
-        return self._timeline.update(stamp)
+        return self.timeline.update(stamp)
 
     def send(self, data: bytes) -> bool:
         """Send to the autopilot; active faults lose, delay or corrupt the packet."""
-        altered = self._altered(data, [f for f in self._timeline.active if f.outwards])
+        altered = self._altered(data, [f for f in self.timeline.active if f.outwards])
         return altered is None or self._send(*altered)
 
     def receive(self) -> list[bytes]:
         """Return the packets received from the autopilot; active faults apply."""
-        faults = [f for f in self._timeline.active if f.inwards]
+        faults = [f for f in self.timeline.active if f.inwards]
         for packet in self.inner.receive():
             altered = self._altered(packet, faults)
             if altered is not None:
