@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from longer import longer
 
+from uam_control.estimation.pose_filter import parts_of
 from uam_control.mission import load_scenario
 from uam_control.offboard.modes import Mode
 from uam_control.profiles.profile import default_profile, load_profile
@@ -139,7 +140,8 @@ def frozen_poses(one):
 
 def broken_estimate(one):
     """Let the estimate diverge."""
-    one.control.estimator.estimator._pose.velocity[0] = np.nan
+    memory = one.control.estimator.estimator.arrays.pose.memory
+    parts_of(memory)[0].velocity[0] = np.nan
 
 
 def storm(one):
