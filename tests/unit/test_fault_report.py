@@ -148,6 +148,7 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
     [
         ("scenario: hover", "moments is missing"),
         ("{scenario: hover, moments: {a: 3}, faults: []}", "moments: names with"),
+        ("{scenario: hover, moments: {}, faults: [{fault: servo_jam}]}", "moments: names with"),
         ("{scenario: hover, moments: {a: {at: pick}}, faults: []}", "no phase 'pick'"),
         ("{scenario: hover, moments: {a: {at: 3}}, faults: 3}", "a list of faults expected"),
         (
@@ -274,6 +275,15 @@ def test_a_range_is_checked_at_both_ends_and_needs_draws(tmp_path, text, draws, 
     file.write_text(f"{{scenario: hover, moments: {{a: {{at: 3}}}}, {text}}}")
     with pytest.raises(FaultError, match=f"mine.yaml: .*{re.escape(message)}"):
         fault_matrix.read(file, "direct", draws=draws)
+
+
+def test_a_row_may_have_a_range_of_durations_and_moments_with_numbers_for_names(tmp_path):
+    file = tmp_path / "mine.yaml"
+    rows = "[{fault: mocap_dropout, duration: [2, 3], moments: [2]}]"
+    file.write_text(f"{{scenario: hover, moments: {{1: {{at: 3}}, 2: {{at: 4}}}}, faults: {rows}}}")
+    cells = fault_matrix.read(file, "direct", draws=5).cells(1)[1:]
+    assert {cell.moment for cell in cells} == {"2"}
+    assert all(2.0 <= cell.schedule.faults[0].duration <= 3.0 for cell in cells)
 
 
 def test_durations_are_those_of_every_row_without_its_own(tmp_path):

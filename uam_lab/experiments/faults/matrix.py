@@ -141,11 +141,13 @@ def _between(value: Any, random: np.random.Generator) -> Any:
 def label(entry: dict[str, Any]) -> str:
     """Return a row's name: the fault, its duration, and the given parameters."""
     shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
-    lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
-    values = ", ".join(
-        f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}" for k, v in shown.items()
-    )
+    lasting = f" {_text(entry['duration'])} s" if "duration" in entry else ""
+    values = ", ".join(f"{key} {_text(value)}" for key, value in shown.items())
     return entry["fault"] + lasting + (f" ({values})" if values else "")
+
+
+def _text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def read(
@@ -211,7 +213,8 @@ def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, A
 
 def _moments(given: Any, scenario: Scenario, where: str, draws: int) -> dict[str, dict[str, Any]]:
     """Return the checked times of the moments; they are written like times of faults."""
-    if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
+    mappings = isinstance(given, dict) and [isinstance(when, dict) for when in given.values()]
+    if not mappings or not all(mappings):
         raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
     any_fault = next(iter(FAULTS))
     for name, when in given.items():
@@ -233,8 +236,8 @@ def _checked(entry: dict[str, Any], where: str, moments: Collection[str], draws:
         if key in entry:
             raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
     promised, own = entry.pop("promise", None), entry.pop("moments", [])
-    known = tuple(moments)  # what is asked may not be hashable
-    if not isinstance(own, list) or not all(one in known for one in own):
+    own = list(map(str, own)) if isinstance(own, list) else own
+    if not isinstance(own, list) or not set(own) <= set(moments):
         raise FaultError(f"{where}: moments: a list of {', '.join(moments)} expected, got {own!r}")
     fault = [timed({**one, "at": 0.0}, {}, where).fault for one in _ends(entry, draws, where)][0]
     promise = None if promised is None else read_promise(promised, where)
