@@ -1,6 +1,6 @@
 """End of a flight that its mission does not end."""
 
-from uam_control.mission.time_limit import Settled
+from uam_control.mission.time_limit import DISARMED, FlightEnd, Settled
 
 
 def test_a_flight_is_over_a_while_after_the_autopilot_has_disarmed():
@@ -27,3 +27,21 @@ def test_after_the_mission_the_flight_goes_on_until_the_autopilot_has_disarmed()
     assert not settled.after_mission(58.0, armed=True)
     assert settled.after_mission(59.0, armed=False)
     assert settled.after_mission(65.0, armed=True), "15 s, and it lands no more"
+
+
+def test_a_node_ends_its_flight_a_while_after_mission_and_landing():
+    end, limit = FlightEnd(linger=2.0), (100.0, "limit")
+    # the mission is done at 10 s, the autopilot disarms at 11 s
+    told = {t: end.reason(t, t < 11.0, t >= 10.0, limit) for t in (9.0, 10.0, 11.0, 12.9, 13.0)}
+    assert told == {9.0: "", 10.0: "", 11.0: "", 12.9: "", 13.0: "mission"}
+
+
+def test_a_node_ends_a_flight_without_end():
+    end = FlightEnd(linger=2.0)
+    told = [end.reason(float(t), t < 3, False) for t in range(9)]
+    assert told == [""] * 8 + [DISARMED], "5 s after it has disarmed"
+    end = FlightEnd(linger=50.0)
+    assert end.reason(99.0, True, False, (100.0, "limit")) == ""
+    assert end.reason(100.0, True, False, (100.0, "limit")) == "limit"
+    end.reason(70.0, False, True)
+    assert end.reason(100.0, False, True, (100.0, "limit")) == "mission", "it was done before"
