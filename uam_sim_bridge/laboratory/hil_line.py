@@ -122,7 +122,7 @@ class HilLine(HilMessages):
 
     def _take(self) -> None:
         while data := self._terminal.read():
-            for message in self.received(data):
+            for message in self._framer.stream(data):
                 self._heard = self._clock()
                 self._station.take(message)
                 if self.take(message):

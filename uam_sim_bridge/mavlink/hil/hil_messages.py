@@ -75,14 +75,6 @@ class HilMessages:
         self._mag = [0.0, 0.0, 0.0]
         self._baro = (0.0, 0.0)
 
-    def encode(self, message: Message) -> bytes:
-        """Return a message of the simulator as bytes."""
-        return self._codec.encode(message)
-
-    def received(self, data: bytes) -> list[Message]:
-        """Return the messages that are complete with `data`."""
-        return self._framer.stream(data)
-
     def sensors(
         self,
         time: float,
@@ -114,7 +106,7 @@ class HilMessages:
             fields,
             0,
         )
-        return self.encode(message)
+        return self._codec.encode(message)
 
     def prepare(self, *sample: Any) -> None:
         """Encode the sensors of a tick for `flush`; sample: see `sensors`."""

@@ -136,7 +136,7 @@ class HilServer(HilMessages):
             return True
         except OSError:
             return False
-        for message in self.received(data):
+        for message in self._framer.stream(data):
             if self.take(message):
                 self.answered = self.answered or message.time_usec >= self.stamp
         return bool(data)
