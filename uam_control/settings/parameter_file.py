@@ -10,9 +10,11 @@ of several nodes can be concatenated.
 A vehicle in a namespace has its sections under `mission:` or `/uav1/mission:`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from uam_control.settings import yaml_file
 
@@ -74,3 +76,9 @@ def _sections(
 
 def _inner(body: Any) -> Any:
     return body.values() if isinstance(body, dict) else [None]
+
+
+def as_text(sections: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return sections, node → parameter → value, as a ROS parameter file; lists in one line."""
+    nodes = {node: {"ros__parameters": values} for node, values in sections.items()}
+    return yaml.safe_dump(nodes, sort_keys=False, default_flow_style=None, width=100)

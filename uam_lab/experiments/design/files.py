@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
+import yaml
+
+from uam_control.settings.parameter_file import as_text
 from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, VehicleDescription, designed
 from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.design.search import RATES, Design
@@ -36,25 +38,13 @@ def write(made: Design, files: Mapping[str, Path]) -> None:
     """Write the files of `files_of`."""
     head = f"{MADE} {made.described.file.name}\n"
     limits = "".join(f"# {loop}: {why}\n" for loop, why in made.limits.items())
-    nodes = {node: {"ros__parameters": values} for node, values in made.profile.sections.items()}
     lines = head + "# what keeps each loop from being faster:\n" + limits
-    write_text(files[PROFILE_FILE], lines + "".join(_block(nodes, "")))
-    write_text(files[AUTOPILOT_FILE], head + "".join(_block(made.described.autopilot_gains, "")))
+    write_text(files[PROFILE_FILE], lines + as_text(made.profile.sections))
+    gains = yaml.safe_dump(made.described.autopilot_gains, sort_keys=False)
+    write_text(files[AUTOPILOT_FILE], head + gains)
     with style.styled():
         for name, draw in PICTURES:
             style.save(draw(made.cases), files[name])
-
-
-def _block(values: Mapping[str, Any], indent: str) -> list[str]:
-    """Return the lines of a mapping in YAML, lists in one line."""
-    lines = []
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            lines += [f"{indent}{name}:\n", *_block(value, f"{indent}  ")]
-        else:
-            text = str(value).lower() if isinstance(value, bool) else value
-            lines.append(f"{indent}{name}: {text}\n")
-    return lines
 
 
 def table(made: Design) -> str:

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import optuna
-import yaml
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from optuna.trial import FrozenTrial
 
+from uam_control.settings.parameter_file import as_text
 from uam_lab.experiments.tuning.front import chosen, front, hypervolumes
 from uam_lab.experiments.tuning.search import DONE, evaluated_start
 from uam_lab.experiments.tuning.space import Space
@@ -50,9 +50,7 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
             for flight in space.flights
         ),
     ]
-    sections = {node: {"ros__parameters": values} for node, values in profile.sections.items()}
-    body = yaml.safe_dump(sections, sort_keys=False, default_flow_style=None, width=100)
-    write_text(file, "".join(f"# {line}\n" for line in head) + body)
+    write_text(file, "".join(f"# {line}\n" for line in head) + as_text(profile.sections))
 
 
 def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
