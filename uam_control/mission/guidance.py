@@ -145,11 +145,6 @@ class Guidance:
         self.memory["following"] = 0
         return count
 
-    @property
-    def followed(self) -> int:
-        """Number of the motions that `follow_path` has written since `look_ahead`."""
-        return self.memory["following"].item()
-
     def pace(self, stamp: float, rate: float) -> None:
         """Change the rate [1] of the scenario's clock: 1 on, 0 stop, -1 back along the path.
 

@@ -204,7 +204,7 @@ class Mission(FlightSequence):
     @property
     def looked_ahead(self) -> int:
         """Number of the steps that `follow_scenario` has done since `look_ahead`."""
-        return self._guidance.followed
+        return self._guidance.memory["following"].item()
 
     def watch(self) -> bool:
         """Step the executive of the grasps after a compiled step; return whether the steps that

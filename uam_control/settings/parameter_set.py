@@ -132,14 +132,11 @@ def switch(default: bool, description: str) -> Any:
     return field(default=default, metadata={"spec": Switch(description)})
 
 
-def text(default: str, description: str, allowed: str, secret: bool = False) -> Any:
+def text(
+    default: str | None, description: str, allowed: str, secret: bool = False, file: bool = False
+) -> Any:
     """Declare a field that is a text; see `Text`."""
-    return field(default=default, metadata={"spec": Text(description, allowed, secret)})
-
-
-def name_or_file(default: str | None, description: str, allowed: str) -> Any:
-    """Declare a field that is a text or a path, see `Text`."""
-    return field(default=default, metadata={"spec": Text(description, allowed, file=True)})
+    return field(default=default, metadata={"spec": Text(description, allowed, secret, file)})
 
 
 def texts(description: str, allowed: str, file: bool = False) -> Any:

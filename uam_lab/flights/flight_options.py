@@ -14,7 +14,6 @@ from uam_control.settings.parameter_set import (
     choice,
     entries,
     integer,
-    name_or_file,
     number,
     switch,
     text,
@@ -115,7 +114,7 @@ class FlightOptions(KeptOptions):
     nodes write the times of their ticks to logs/. command: how the flight was requested.
     """
 
-    scenario: str | Path = name_or_file("pick_and_place", "what is flown", "NAME|FILE")
+    scenario: str | Path = text("pick_and_place", "what is flown", "NAME|FILE", file=True)
     end: str = _of_scenario("end")
     retime: bool = switch(
         False, "slow a scenario that exceeds a limit of the vehicle down until it does not"
@@ -123,14 +122,15 @@ class FlightOptions(KeptOptions):
     transit_speed: float = _of_scenario("transit_speed")
     transit_acceleration: float = _of_scenario("transit_acceleration")
     profile: tuple[str | Path, ...] = texts("parameters of the nodes", "NAME|FILE", file=True)
-    vehicle: str | Path = name_or_file(DEFAULT_VEHICLE, "vehicle", "NAME|FILE")
+    vehicle: str | Path = text(DEFAULT_VEHICLE, "vehicle", "NAME|FILE", file=True)
     plant_preset: tuple[str, ...] = texts("effects of the plant", "NAME|FILE")
     effects: tuple[str, ...] = texts("changes of these effects", "SPEC")
-    px4_dir: str | Path | None = name_or_file(
-        None, "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)", "DIR"
+    px4_dir: str | Path | None = text(
+        *(None, "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)", "DIR"),
+        file=True,
     )
     payload_mass: float | None = number(None, "default: the scenario's", "kg", 0.0, HEAVIEST)
-    out: str | Path | None = name_or_file(None, "result folder", "DIR")
+    out: str | Path | None = text(None, "result folder", "DIR", file=True)
     vehicle_changes: Mapping[str, Any] = entries("changes of the vehicle's numbers")
     instance: int | None = integer(
         None,
