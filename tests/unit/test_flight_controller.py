@@ -58,6 +58,7 @@ def test_remappings_of_a_node_keep_to_that_node():
     "given, text",
     [
         ({"fused": True, "engine": "direct"}, "--fused needs --engine ros"),
+        ({"auto_start": False, "engine": "direct"}, "auto_start=False needs --engine ros"),
         ({"inner_rate": 50.0}, "--inner-rate needs --fused"),
         (
             {"fused": True, "inner_rate": 50.0, "without": ["arm_controller=mine"]},

@@ -205,6 +205,7 @@ NOT_DIRECT: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
     ),
     (lambda o: o.process or o.tick_times, "no nodes: options of their processes need"),
     (lambda o: o.fused, "no nodes: --fused needs"),
+    (lambda o: not o.auto_start, "no command to start: auto_start=False needs"),
 )
 CONTRADICTIONS: tuple[tuple[Callable[[FlightOptions], Any], str], ...] = (
     (
