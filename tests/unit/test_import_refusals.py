@@ -43,6 +43,8 @@ HOSTILE = {  # what is replaced by what → what is said, and the text in whose 
         '"arm_0"',
     ),
     "limit in degrees": ('upper="1.9"', 'upper="109"', "109 rad is over two turns", '"joint_0"'),
+    "no value of a mass": ('<mass value="0.08"/>', "<mass/>", "without <mass value>", '"arm_0"'),
+    "shape in mm": ('size="0.2 0.2 0.1"', 'size="200 200 100"', "is 300 m large", '"base_link"'),
     "no XML": ("</robot>", "", "no XML", ""),
 }  # fmt: skip
 

@@ -392,6 +392,14 @@ def test_the_command_refuses_in_one_line_with_status_2(tmp_path, capsys):
     assert said.startswith("uam vehicle: ") and said.count("\n") == 1 and "mine.urdf line" in said
 
 
+@pytest.mark.parametrize("name", ["../mine", "/mine", "my drone"])
+def test_a_name_that_leaves_the_folder_or_the_printed_command_is_refused(tmp_path, capsys, name):
+    file, out = write(tmp_path, drone()), tmp_path / "o"
+    assert run(parsed(["vehicle", "import", str(file), "--out", str(out), "--name", name])) == 2
+    assert "--name: " in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [file]
+
+
 def test_the_command_writes_files_and_a_picture_once(tmp_path, capsys):
     file, out = write(tmp_path, drone()), tmp_path / "o"
     words = ["vehicle", "import", str(file), "--out", str(out), "--no-questions"]

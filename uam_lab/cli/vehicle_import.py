@@ -20,6 +20,7 @@ and line.
 """
 
 import argparse
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,8 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.importing.structure import Chosen
 
     name = options.name or importer.usual_name(options.file)
+    if not re.fullmatch(r"[\w.-]+", name):
+        raise ImportRefused(f"--name: {name!r}: letters, digits, '_', '-' and '.' expected")
     folder = options.out or Path(name)
     written = folder / f"{name}.yaml"
     if written.exists() and not options.overwrite:

@@ -6,7 +6,7 @@ import math
 import mujoco
 import numpy as np
 
-from uam_lab.importing.source import ImportRefused
+from uam_lab.importing.source import LARGE, ImportRefused
 from uam_lab.importing.structure import Parts
 
 LEAST_MASS = 1e-6  # [kg]
@@ -190,3 +190,7 @@ def refuse_units(parts: Parts) -> None:
         if (most := float(np.linalg.eigvalsh(tensor)[-1])) > mass * FARTHEST**2:
             text = f"inertia {most:.3g} kg m^2 of {mass:.3g} kg: in g mm^2? kg m^2 are expected"
             raise parts.source.error("body", body, text)
+        for geom in shapes(parts, link, True) + shapes(parts, link, False):
+            if (large := 2.0 * float(parts.model.geom_rbound[geom])) > LARGE:
+                text = f"its shape is {large:.4g} m large: in mm? m are expected"
+                raise parts.source.error("body", body, text)

@@ -10,6 +10,7 @@ from lxml import etree
 from uam_control.vehicle import VehicleError
 
 LARGEST_FILE = 20e6  # [bytes] of a description
+LARGE = 20.0  # [m] of a vehicle's part: a shape in mm
 NAMED = re.compile(r"(?:name|material|mesh|body|joint|link) '([^']+)'")  # in a text of MuJoCo
 XmlElement = etree._Element  # lxml has no public name for its type
 

@@ -10,6 +10,7 @@ import numpy as np
 from lxml import etree
 
 from uam_lab.importing.source import (
+    LARGE,
     ImportRefused,
     JointFacts,
     RotorFacts,
@@ -20,7 +21,6 @@ from uam_lab.importing.source import (
 
 READ = (".stl", ".obj", ".msh")  # by MuJoCo
 LARGEST_MESH = 100e6  # [bytes]
-LARGE = 20.0  # [m] of a vehicle's part: a mesh in mm
 SEARCHED = 6  # folders above the file
 WORLD, FREE = "world", "free_base"  # link and joint above the base
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -191,12 +191,12 @@ class _Urdf:
         inertial = link.find("inertial")
         if inertial is None:
             return
-        mass, tensor = inertial.find("mass"), inertial.find("inertia")
+        mass, tensor = inertial.find("mass[@value]"), inertial.find("inertia")
         if tensor is None and mass is not None and self._numbers(mass, "value", 1) == [0.0]:
             link.remove(inertial)  # a frame
             return
         if mass is None or tensor is None:
-            lacks = "mass" if mass is None else "inertia"
+            lacks = "mass value" if mass is None else "inertia"
             raise self.error(inertial, f"link '{name}': <inertial> without <{lacks}>")
         (value,) = self._numbers(mass, "value", 1)
         if value < 0.0:
@@ -285,7 +285,7 @@ def _fill(link: XmlElement) -> None:
         inertial = etree.SubElement(link, "inertial")
         etree.SubElement(inertial, "mass", value="0")
         etree.SubElement(inertial, "inertia", dict.fromkeys(TENSOR, "0"))
-    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    mass, tensor = inertial.find("mass[@value]"), inertial.find("inertia")
     if float(mass.get("value")) < LEAST:
         mass.set("value", f"{LEAST:g}")
     if not any(float(tensor.get(key, "0")) for key in TENSOR):
