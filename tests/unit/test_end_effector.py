@@ -300,8 +300,11 @@ def rows_of_csv(elevation=""):
     return lines
 
 
-def test_a_csv_file_of_the_hand(tmp_path):
-    (tmp_path / "line.csv").write_text("\n".join([HEADER, *rows_of_csv()]))
+@pytest.mark.parametrize("rests", [range(1, 1), [*range(1, 10), *range(51, 60)]])
+def test_a_csv_file_of_the_hand(rests, tmp_path):
+    """rests: rows left out, of the rests: the two rows around them say as much."""
+    rows = [row for number, row in enumerate(rows_of_csv()) if number not in rests]
+    (tmp_path / "line.csv").write_text("\n".join([HEADER, *rows]))
     task = tmp_path / "task.yaml"
     task.write_text("trajectory: {kind: end_effector, shape: csv, file: line.csv}\n")
     vehicle = load_description()

@@ -1,16 +1,17 @@
 """Whole-body L1: values by hand, the closed loop on rigid bodies, and what it refuses."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from longer import longer
 from random_chains import chi_of, in_pinocchio, pin, random_chain
 
 from uam_control.arm.chain import as_parameters
 from uam_control.arm.floating import decoupled, stiff, write_task
 from uam_control.arm.kinematics import gravity_torque
+from uam_control.control import whole_body
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.thrust_direction import write_thrust_attitude
 from uam_control.control.whole_body import WholeBody
@@ -24,6 +25,16 @@ VEHICLE = load_description("t650")
 PROFILE = default_profile("whole_body_l1", VEHICLE)  # config/vehicle/t650.yaml names fsc_whole_body
 SETS = PROFILE.sets
 HOME = np.radians([0.0, 40.0, 40.0, 0.0])
+
+
+@pytest.fixture(autouse=True)
+def in_python(monkeypatch):
+    """Run the law's own functions uncompiled: to compile them for these arms takes a minute."""
+    for name, function in vars(whole_body).copy().items():
+        python = getattr(function, "py_func", None)
+        if getattr(python, "__module__", "") == whole_body.__name__:
+            monkeypatch.setattr(whole_body, name, python)
+    monkeypatch.setattr(whole_body, "bound", lambda step, arrays, *_: partial(step, arrays))
 
 
 class Flown:
@@ -149,8 +160,7 @@ def test_a_joint_that_is_cut_is_missing_at_the_base():
     np.testing.assert_allclose(torque - free_q, coupling.T @ (joints - free), atol=1e-9)
 
 
-# 4 joints; 1 and 7 joints, for which the law is compiled half a minute each
-@pytest.mark.parametrize("seed", [1, 6, *(longer(one) for one in (7, 11, 13, 23))])
+@pytest.mark.parametrize("seed", [1, 6, 7, 11, 13, 23])
 def test_any_arm_of_one_to_seven_joints(seed):
     """At rest it holds every random vehicle; beside its reference the outputs are finite."""
     random = np.random.default_rng(seed)

@@ -14,7 +14,6 @@ t and the position are required. Agilicious' names p_x, q_w, v_x, a_lin_x ... me
 body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
 """
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +27,7 @@ from uam_control.mission.scenarios.fitted_spline import (
     Misfit,
     between_rests,
     fitted,
+    with_pauses,
     worst_swing,
 )
 from uam_control.mission.scenarios.route import Route
@@ -64,7 +64,6 @@ OTHER_UNITS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}  # of t [s]
 PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
 LONG, CRAWL, FAR = 600.0, 0.01, 0.1  # [s, m/s, m] a race of 10 m/s, its times in ms, crawls
 LARGEST = 1e6  # [SI] of a position, rate or angle
-SHORTEST_PAUSE, PAUSE_STEP = 0.5, 0.1  # [s] of a pause; between the rows that it gets
 UNIT = 0.02  # largest deviation of a quaternion's norm from 1
 # rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
 FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
@@ -111,7 +110,8 @@ class _Table:
             raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
         t = numbers[:, self._names.index("t")]
         check_length(t[-1] - t[0], f"{file}: column t", LONGEST_FILE)  # before its pauses are made
-        self._numbers, self._rows = self._with_pauses(numbers)
+        moving = [i for i, name in enumerate(self._names) if name not in ("t", "magnet")]
+        self._numbers, self._rows = with_pauses(numbers, self._names.index("t"), moving)
         backward = np.flatnonzero(np.diff(self.times) <= 0.0)
         if len(backward):
             raise self.error(int(backward[0]) + 1, "t", "time does not increase")
@@ -154,25 +154,6 @@ class _Table:
     def line(self, row: int) -> int:
         """Return the line of a row, counted from 0."""
         return self._table.lines[self._rows[row]]
-
-    def _with_pauses(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rows with more of them in each pause, and the row of the file of each.
-
-        A pause: two rows that differ in time alone, and in the magnet.
-        """
-        where = [i for i, name in enumerate(self._names) if name not in ("t", "magnet")]
-        t = self._names.index("t")
-        rows, of = [numbers[:1]], [0]
-        for i, (one, other) in enumerate(zip(numbers, numbers[1:], strict=False)):
-            if other[t] - one[t] > SHORTEST_PAUSE and np.array_equal(one[where], other[where]):
-                count = math.ceil((other[t] - one[t]) / PAUSE_STEP)
-                inner = np.repeat(one[None], count - 1, axis=0)
-                inner[:, t] = np.linspace(one[t], other[t], count + 1)[1:-1]
-                rows.append(inner)
-                of += [i] * len(inner)
-            rows.append(other[None])
-            of.append(i + 1)
-        return np.vstack(rows), np.array(of)
 
     def header_error(self, text: str) -> ScenarioError:
         """Return the error of the header."""

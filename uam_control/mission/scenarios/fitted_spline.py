@@ -13,6 +13,7 @@ gap is checked against the box of its two rows and of the way that their rates p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -38,6 +39,7 @@ DENSE = 1.5  # rows per interval, from which on
 LEAST_ACCELERATION = 1e-6  # [s^2] of acceleration itself: decides where under four samples do not
 PLACES = 32  # at which a gap is checked
 OUTSIDE, OF_DISTANCE = 0.2, 0.5  # [m or rad] and of the distance of the rows: the rest is a swing
+SHORTEST_PAUSE, PAUSE_STEP = 0.5, 0.1  # [s] of a pause; between the rows that it gets
 SLOW = 1e-3  # [m/s], [rad/s] below which a coordinate rests
 
 
@@ -55,6 +57,26 @@ class CurveSamples(NamedTuple):
     values: np.ndarray
     rates: np.ndarray | None = None
     accelerations: np.ndarray | None = None
+
+
+def with_pauses(
+    numbers: np.ndarray, t: int, moving: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows (m, k) with more of them in each pause, and the given row of each.
+
+    A pause: two rows with the same values in the columns `moving`; t: the column of time [s].
+    """
+    rows, of = [numbers[:1]], [0]
+    for i, (one, other) in enumerate(zip(numbers, numbers[1:], strict=False)):
+        if other[t] - one[t] > SHORTEST_PAUSE and np.array_equal(one[moving], other[moving]):
+            count = math.ceil((other[t] - one[t]) / PAUSE_STEP)
+            inner = np.repeat(one[None], count - 1, axis=0)
+            inner[:, t] = np.linspace(one[t], other[t], count + 1)[1:-1]
+            rows.append(inner)
+            of += [i] * len(inner)
+        rows.append(other[None])
+        of.append(i + 1)
+    return np.vstack(rows), np.array(of)
 
 
 def fitted(

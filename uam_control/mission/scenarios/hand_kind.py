@@ -31,7 +31,7 @@ from uam_control.coordinates import (
 )
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.mission.motion.polynomials import Polynomials, joined
-from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
+from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted, with_pauses
 from uam_control.mission.scenarios.hand_motion import (
     BEFORE,
     Task,
@@ -213,8 +213,9 @@ class _Reader:
         if len(numbers) < 2 or np.any(np.diff(numbers[:, 0]) <= 0.0):
             raise ScenarioError(f"{table.file}: column t: two or more increasing times expected")
         posture = self._posture(0.0)
+        check_length(numbers[-1, 0] - numbers[0, 0], f"{table.file}: column t", LONGEST_FILE)
+        numbers, of = with_pauses(numbers, 0, range(1, len(allowed)))
         times = numbers[:, 0] - numbers[0, 0]
-        check_length(times[-1], f"{table.file}: column t", LONGEST_FILE)
         values = np.zeros((len(times), ALPHA + len(posture)))
         values[:, POSITION], values[:, YAW] = numbers[:, 1:4], np.unwrap(numbers[:, 4])
         values[:, ARM] = posture
@@ -224,7 +225,7 @@ class _Reader:
             (path,) = fitted(times, [CurveSamples(values)], PASSES)
         except Misfit as error:
             text = f"no smooth curve passes within {PASSES:g}, it is {error.distance:.3g} off"
-            raise table.error(table.lines[error.row], text) from None
+            raise table.error(table.lines[of[error.row]], text) from None
         if not all(at_rest(rows) for rows in path.ends()):
             raise ScenarioError(f"{table.file}: the hand must be at rest in the first and last row")
         return self._source(path, posture, 0.0, set(), lifted=LIFTED in table.header)

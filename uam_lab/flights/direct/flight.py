@@ -100,10 +100,12 @@ class DirectFlight:
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not (output.done and settled.after_mission(plant.time, self.armed)):
-            second = plant.tick // ticks_a_second
+            before, second = plant.tick, plant.tick // ticks_a_second
             left = int((self._limit - plant.time) / plant.period)
             try:
                 self.advance((second + 1) * ticks_a_second - plant.tick, left)
+                if plant.tick == before:
+                    raise PhysicsError(f"{type(plant).__name__}.step() does not add 1 to `tick`")
             except PhysicsError as error:
                 self.ended_by = str(error)
                 break
