@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from whole_flight import ROOT, Flight
 
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import load_profile
+from uam_lab.flights.direct import flight as direct
 from uam_lab.records.results import timeseries
+from uam_sim_bridge.plant import Vehicle
 
 PLANT = "rigid_body_plant:RigidBodyPlant"
 
@@ -28,3 +32,26 @@ def test_a_plant_of_ones_own_hovers(engine, short_scenario, tmp_path, monkeypatc
     assert hover.any() and np.abs(error).max() < 0.05
     # nothing of MuJoCo's noise and payload: the plant was this one
     assert np.isnan(series["payload.z"]).all() and series["truth.z"].max() > 0.55
+
+
+@pytest.mark.parametrize(
+    ("pose", "why"),
+    [(lambda mocap: None, "a sensor without samples"), (lambda m: (*m[:2], 0 * m[2]), "diverged")],
+)
+def test_a_plant_without_usable_poses_ends_before_take_off_with_the_reason(pose, why, monkeypatch):
+    """No tick of the mission comes then: it cannot end by itself."""
+    monkeypatch.setattr(direct, "LONGEST_WAIT", 3.0)
+    flight = direct.DirectFlight(
+        load_scenario("hover"), load_profile("s500"), Vehicle.load(), 0.0, 1, plant=PLANT
+    )
+    sense = flight.plant.sense
+
+    def sensed():
+        samples = sense()
+        samples.mocap = samples.mocap and pose(samples.mocap)
+        return samples
+
+    monkeypatch.setattr(flight.plant, "sense", sensed)
+    flight.run()
+    assert flight.plant.time < 5.0
+    assert "no state of the estimator" in flight.ended_by and why in flight.ended_by

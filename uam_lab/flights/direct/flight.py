@@ -113,11 +113,12 @@ class DirectFlight:
                 if progress is not None and progress(output.time, output.phase):
                     break
                 if settled.over(plant.time, self.armed):
-                    silent = plant.time - self.control.mission.ahead / SECOND
-                    lost = f"no state of the estimator for {silent:.1f} s: IMU lost? "
-                    self.ended_by = (lost if silent > STILL else "") + DISARMED
+                    self.ended_by = self._silence + DISARMED
                     break
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
+                if self._silence:  # the mission has no ticks in which it could end
+                    self.ended_by = self._silence.rstrip()
+                    break
                 reasons = "; ".join(self.sequence.reasons) or "no reason"
                 not_armed = f"the autopilot did not arm: {reasons}"
                 against = self.mission.checks.beyond or self.mission.not_ready or not_armed
@@ -126,6 +127,17 @@ class DirectFlight:
                 self.ended_by = f"time limit of {self._limit:g} s"
                 break
         return self.recording
+
+    @property
+    def _silence(self) -> str:
+        """Since when there is no state, and why; "" while there are some."""
+        silent = self.plant.time - self.control.mission.ahead / SECOND
+        if silent <= STILL:
+            return ""
+        why = "IMU lost?" if self.control.mission.ahead > 0 else "a sensor without samples?"
+        if self.control.estimator.diverged:
+            why = "estimate diverged, samples not finite?"
+        return f"no state of the estimator for {silent:.1f} s: {why} "
 
     @property
     def mission(self) -> Mission:
