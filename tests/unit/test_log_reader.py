@@ -17,11 +17,14 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
+from uam_lab.flights.flight_settings import settings
+from uam_lab.flights.ros.logged_outcome import logged
 from uam_lab.records.recording import log_reader, logged_topics
 from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog
 from uam_lab.records.recording.logged_topics import ADAPTATION, Log
 from uam_lab.records.recording.mcap_reader import TopicLog, UnreadableLog
+from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
@@ -258,3 +261,12 @@ def test_a_message_of_something_else_is_left_out_with_a_note():
     (entry,) = log_reader.parameter_changes(log, 0)
     assert (entry["node"], entry["time_s"]) == ("mission", 1.0)
     assert log.notes == [f"{topic.name}: 1 messages cannot be read; left out"]
+
+
+def test_a_flight_that_ended_before_its_recorder_says_so(tmp_path):
+    folder = ResultFolder(tmp_path)
+    ended = logged(settings("hover"), folder, None, True, [])
+    assert ended.failure == "nothing recorded: the flight ended before the recorder began"
+    folder.log.write_bytes(b"no log")
+    broken = logged(settings("hover"), folder, None, True, [])
+    assert "nothing recorded: " in broken.failure and "before the recorder" not in broken.failure

@@ -50,7 +50,8 @@ def logged(
     try:
         outcome = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
     except (UnreadableLog, OSError) as error:
-        outcome = Outcome(series=None, failure=f"nothing recorded: {error}")
+        why = error if folder.log.exists() else "the flight ended before the recorder began"
+        outcome = Outcome(series=None, failure=f"nothing recorded: {why}")
     outcome.interrupted = interrupted
     if failure is not None and not interrupted:
         outcome.failure, outcome.details = str(failure), failure.last_lines
