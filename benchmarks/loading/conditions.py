@@ -49,10 +49,14 @@ def writer(folder: Path, domain: int) -> None:
                 os.fsync(file.fileno())
 
 
+def discovery_port(domain: int) -> int:
+    """Return the UDP port of the first participant's discovery (RTPS 2.2, 9.6.1.1)."""
+    return 7410 + 250 * domain
+
+
 def listener(folder: Path, domain: int) -> None:
     """Receive every message of /diagnostics, after the start of the flight."""
-    first = 7410 + 250 * domain  # of a participant's discovery: RTPS 2.2, 9.6.1.1
-    while not in_use(socket.SOCK_DGRAM, first):
+    while not in_use(socket.SOCK_DGRAM, discovery_port(domain)):
         time.sleep(WAIT)
     os.environ.update(ros_environment(domain, folder))
     import rclpy

@@ -78,10 +78,7 @@ def assert_final(flight, heights, motors):
 
 @pytest.mark.parametrize(
     ("phase", "seconds"),
-    [
-        pytest.param(*case, marks=() if case in IN_SHORT else pytest.mark.long)
-        for case in product(AFTER, ENGAGED)
-    ],
+    [case if case in IN_SHORT else longer(*case) for case in product(AFTER, ENGAGED)],
 )
 def test_a_kill_is_final_also_when_the_switch_goes_off_again(phase, seconds):
     flight = direct("quick_pick")

@@ -34,6 +34,20 @@ def test_a_plant_of_ones_own_hovers(engine, short_scenario, tmp_path, monkeypatc
     assert np.isnan(series["payload.z"]).all() and series["truth.z"].max() > 0.55
 
 
+def hover():
+    """Return a flight of the direct engine with this plant, not begun."""
+    return direct.DirectFlight(
+        load_scenario("hover"), load_profile("s500"), Vehicle.load(), 0.0, 1, plant=PLANT
+    )
+
+
+def test_a_plant_that_does_not_count_its_ticks_ends_the_flight(monkeypatch):
+    flight = hover()
+    monkeypatch.setattr(flight.plant, "step", lambda *inputs: None)
+    flight.run()
+    assert flight.ended_by.endswith("RigidBodyPlant.step() does not add 1 to `tick`")
+
+
 @pytest.mark.parametrize(
     ("pose", "why"),
     [(lambda mocap: None, "a sensor without samples"), (lambda m: (*m[:2], 0 * m[2]), "diverged")],
@@ -41,9 +55,7 @@ def test_a_plant_of_ones_own_hovers(engine, short_scenario, tmp_path, monkeypatc
 def test_a_plant_without_usable_poses_ends_before_take_off_with_the_reason(pose, why, monkeypatch):
     """No tick of the mission comes then: it cannot end by itself."""
     monkeypatch.setattr(direct, "LONGEST_WAIT", 3.0)
-    flight = direct.DirectFlight(
-        load_scenario("hover"), load_profile("s500"), Vehicle.load(), 0.0, 1, plant=PLANT
-    )
+    flight = hover()
     sense = flight.plant.sense
 
     def sensed():

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from loading.conditions import discovery_port
 
 from uam_sim_bridge import ports
 from uam_sim_bridge.ports import PortError, Reservation
@@ -101,7 +102,7 @@ def test_a_ros_program_in_the_domain_does_not_move_a_flight(tmp_path):
     """A ros2 daemon holds the discovery port of the domain that its user works in."""
     instance = 37  # not used by flights beside this test
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as daemon:
-        daemon.bind(("127.0.0.1", 7410 + 250 * ports.ports_of(instance).domain))
+        daemon.bind(("127.0.0.1", discovery_port(ports.ports_of(instance).domain)))
         with Reservation(instance, folder=tmp_path) as flight:
             assert flight.ports == ports.ports_of(instance)
 

@@ -126,7 +126,9 @@ class FlightOptions(KeptOptions):
     plant_preset: tuple[str, ...] = texts("effects of the plant", "NAME|FILE")
     effects: tuple[str, ...] = texts("changes of these effects", "SPEC")
     px4_dir: str | Path | None = text(
-        *(None, "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)", "DIR"),
+        None,
+        "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)",
+        "DIR",
         file=True,
     )
     payload_mass: float | None = number(None, "default: the scenario's", "kg", 0.0, HEAVIEST)

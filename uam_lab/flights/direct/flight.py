@@ -113,11 +113,11 @@ class DirectFlight:
                 if progress is not None and progress(output.time, output.phase):
                     break
                 if settled.over(plant.time, self.armed):
-                    self.ended_by = self._silence + DISARMED
+                    self.ended_by = f"{self._silence} {DISARMED}".lstrip()
                     break
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
-                if self._silence:  # the mission has no ticks in which it could end
-                    self.ended_by = self._silence.rstrip()
+                self.ended_by = self._silence
+                if self.ended_by:  # the mission has no ticks in which it could end
                     break
                 reasons = "; ".join(self.sequence.reasons) or "no reason"
                 not_armed = f"the autopilot did not arm: {reasons}"
@@ -137,7 +137,7 @@ class DirectFlight:
         why = "IMU lost?" if self.control.mission.ahead > 0 else "a sensor without samples?"
         if self.control.estimator.diverged:
             why = "estimate diverged, samples not finite?"
-        return f"no state of the estimator for {silent:.1f} s: {why} "
+        return f"no state of the estimator for {silent:.1f} s: {why}"
 
     @property
     def mission(self) -> Mission:

@@ -269,7 +269,8 @@ def process_remappings(settings: FlightSettings, process: str) -> list[str]:
 def remappings(settings: FlightSettings, node: str) -> list[str]:
     """Return the ROS arguments with the remappings of a node; those of its own come first."""
     own = settings.remappings.get(node, {})
-    names = {**own, **settings.remappings.get(EVERY_NODE, {}), **own}
+    every = settings.remappings.get(EVERY_NODE, {})
+    names = own | {old: new for old, new in every.items() if old not in own}
     return [word for old, new in names.items() for word in ("-r", f"{old}:={new}")]
 
 
