@@ -16,7 +16,13 @@ from uam_lab.flights.ros.process_fault_injection import program_of
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation, Range
+from uam_sim_bridge.px4.px4_installation import (
+    LOOP_VARIABLE,
+    VARIABLE,
+    Px4Error,
+    Px4Installation,
+    Range,
+)
 
 SCRIPT = """#!/bin/sh
 env | grep ^PX4_ > seen
@@ -83,6 +89,13 @@ def test_no_build_is_refused_in_one_line(tmp_path, monkeypatch):
         with pytest.raises(Px4Error, match="bin/px4 and etc/") as error:
             Px4Installation.find(given)
         assert "\n" not in str(error.value)
+
+
+def test_without_a_build_each_use_names_its_own_variable(tmp_path, monkeypatch):
+    monkeypatch.delenv(LOOP_VARIABLE, raising=False)
+    for given in (None, tmp_path):
+        with pytest.raises(Px4Error, match=f"--px4-dir DIR or {LOOP_VARIABLE}: .*nolockstep"):
+            Px4Installation.in_the_loop(given)
 
 
 def test_a_build_without_its_startup_script_is_refused(build):

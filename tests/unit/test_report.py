@@ -265,6 +265,11 @@ def test_a_missing_info_is_no_error_and_a_damaged_file_is_one_line(
         assert capsys.readouterr().err == f"uam report: {file}: {complaint}\n"
 
 
+def test_the_log_stands_for_its_folder(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "log.mcap")]) == 2
+    assert capsys.readouterr().err == f"uam report: {tmp_path} has no log.mcap for a report\n"
+
+
 def test_outcomes_in_words():
     assert flight_summary.payload_story({"payload_lifted": None}) == "no payload in this flight"
     never = {"payload_lifted": None, "payload_mass_kg": 0.2}

@@ -24,7 +24,8 @@ SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
 
 
 def add(command: Command) -> None:
-    command.option("directories", "DIR", "result folder of a flight", nargs="+", type=Path)
+    text = "result folder of a flight, or its log.mcap"
+    command.option("directories", "DIR", text, nargs="+", type=_folder)
     text = "result folder (default: the given one; for several flights results/<time>-report)"
     command.option("--out", "DIR", text, type=Path)
     command.option("--scenario", "NAME|FILE", "the flown scenario, for a log without one")
@@ -32,6 +33,11 @@ def add(command: Command) -> None:
     command.option("--ulog", "FILE", text, type=Path)
     command.switch("--no-video", "leave out the video, which takes longest")
     command.switch("--no-pictures", "leave out snapshots and video")
+
+
+def _folder(text: str) -> Path:
+    path = Path(text)
+    return path.parent if path.name == "log.mcap" else path
 
 
 def run(options: argparse.Namespace) -> int:

@@ -15,6 +15,10 @@ REQUIRED = (
     f"--px4-dir DIR or {VARIABLE}: a PX4 build directory with bin/px4 and etc/, "
     "as build/px4_sitl_default after `make px4_sitl_default`"
 )
+_REQUIRED_IN_LOOP = (
+    f"--px4-dir DIR or {LOOP_VARIABLE}: a PX4 build directory, as build/px4_sitl_nolockstep after "
+    "`make px4_sitl_nolockstep`"
+)
 _STARTUP = "etc/init.d-posix/rcS"
 _LISTED = "parameters.json"
 _BOARD, _OWN_CLOCK = "px4_boardconfig.h", "CONFIG_BOARD_NOLOCKSTEP 1"
@@ -102,13 +106,7 @@ class Px4Installation:
 
         Raises Px4Error.
         """
-        given = directory or os.environ.get(LOOP_VARIABLE)
-        if not given:
-            raise Px4Error(
-                f"no PX4 build given: --px4-dir DIR or {LOOP_VARIABLE}, as "
-                "build/px4_sitl_nolockstep after `make px4_sitl_nolockstep`"
-            )
-        found = cls.find(given)
+        found = cls._found(directory or os.environ.get(LOOP_VARIABLE), _REQUIRED_IN_LOOP)
         found.require_own_clock()
         return found
 
@@ -118,12 +116,15 @@ class Px4Installation:
 
         For PX4's source directory it returns the build in build/px4_sitl_default. Raises Px4Error.
         """
-        given = directory or os.environ.get(VARIABLE)
+        return cls._found(directory or os.environ.get(VARIABLE), REQUIRED)
+
+    @classmethod
+    def _found(cls, given: str | Path | None, required: str) -> Px4Installation:
         if not given:
-            raise Px4Error(f"no PX4 build given: set {REQUIRED}")
+            raise Px4Error(f"no PX4 build given: set {required}")
         base = Path(given).expanduser().absolute()
         for place in (base, base / _IN_SOURCES):
             found = cls(place)
             if os.access(found.binary, os.X_OK) and (place / _STARTUP).is_file():
                 return found
-        raise Px4Error(f"{given} holds no PX4 build: set {REQUIRED}")
+        raise Px4Error(f"{given} holds no PX4 build: set {required}")
