@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
-from uam_lab.cli.command import Command, number
+from uam_lab.cli.command import Command, number, path
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import say
@@ -74,9 +74,9 @@ def add(command: Command) -> None:
     command.option("--height", "M", text, type=number("height", "m", 0.0, 2.0))
     text = "duration of a measurement"
     command.option("--duration", "S", text, 3.0, type=number("duration", "s", 1.0, 60.0))
-    command.option("--log", "CSV", "recorded poses instead of the running system", type=Path)
-    command.option("--save", "CSV", "write the measured poses", type=Path)
-    command.option("--out", "FILE", "", Path("mocap_calibration.yaml"), type=Path)
+    command.option("--log", "CSV", "recorded poses instead of the running system", type=path)
+    command.option("--save", "CSV", "write the measured poses", type=path)
+    command.option("--out", "FILE", "", Path("mocap_calibration.yaml"), type=path)
 
 
 def run(options: argparse.Namespace) -> int:

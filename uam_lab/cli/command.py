@@ -189,7 +189,7 @@ class Command:
     def out(self, folder: str = "") -> None:
         """Add --out; folder: name of the default folder without the time."""
         text = f"result folder (default results/<time>-{folder or self.name})"
-        self.option("--out", "DIR", text, type=Path)
+        self.option("--out", "DIR", text, type=path)
 
     def instance(self) -> None:
         """Add --instance, of a running flight."""
@@ -306,6 +306,13 @@ def seed(text: str) -> int:
             f"'{text}' is not a seed: a whole number from 0 to {LAST_SEED}"
         )
     return int(text)
+
+
+def path(text: str) -> Path:
+    """Return a path, the type of an option; an empty name would be the present folder."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("the name is empty")
+    return Path(text)
 
 
 def number(

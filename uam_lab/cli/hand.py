@@ -26,7 +26,7 @@ from uam_control.arm.chain import Chain
 from uam_control.arm.kinematics import DOWN, hand_pose, vehicle_centre
 from uam_control.maths.rotations import quaternion_from_matrix
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of, load_description
-from uam_lab.cli.command import Command, number, refuse_given
+from uam_lab.cli.command import Command, number, path, refuse_given
 from uam_lab.flights.node_options import SettingsError
 from uam_lab.records.results.terminal import say
 
@@ -53,7 +53,7 @@ def add(command: Command) -> None:
     place = number("place", "m", -100.0, 100.0)
     text = "ik: place of the end effector in the base frame [m]"
     command.option("--position", ("X", "Y", "Z"), text, type=place, nargs=3)
-    command.option("--out", "FILE", "workspace: picture, PNG", type=Path)
+    command.option("--out", "FILE", "workspace: picture, PNG", type=path)
     command.switch("--json", "print JSON, for programs")
 
 

@@ -17,11 +17,10 @@ bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong u
 
 import argparse
 import time
-from pathlib import Path
 
 from uam_control.mission import load_scenario
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import Command, given_profile, number
+from uam_lab.cli.command import Command, given_profile, number, path
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -42,7 +41,7 @@ def add(command: Command) -> None:
     text = "delay added to the setpoints, in whole control periods"
     command.option("--delay", "MS", text, 0.0, type=number("delay", "ms", 0.0, 200.0))
     text = "result folder of a flight with the adapted gains (default: --scenario is flown)"
-    command.option("--flight", "DIR", text, type=Path)
+    command.option("--flight", "DIR", text, type=path)
     command.switch("--initial", "only the initial gains of the profile")
     command.out()
 

@@ -14,7 +14,7 @@ examples:
 import argparse
 from pathlib import Path
 
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, path
 from uam_lab.flights.flight_settings import require_ros
 from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
 from uam_lab.records.results.terminal import Terminal, say
@@ -27,17 +27,17 @@ def add(command: Command) -> None:
     text = "result folder of a flight, or its log.mcap"
     command.option("directories", "DIR", text, nargs="+", type=_folder)
     text = "result folder (default: the given one; for several flights results/<time>-report)"
-    command.option("--out", "DIR", text, type=Path)
+    command.option("--out", "DIR", text, type=path)
     command.option("--scenario", "NAME|FILE", "the flown scenario, for a log without one")
     text = "log of PX4 to show beside ours (default: px4.ulg of the folder); needs pyulog"
-    command.option("--ulog", "FILE", text, type=Path)
+    command.option("--ulog", "FILE", text, type=path)
     command.switch("--no-video", "leave out the video, which takes longest")
     command.switch("--no-pictures", "leave out snapshots and video")
 
 
 def _folder(text: str) -> Path:
-    path = Path(text)
-    return path.parent if path.name == "log.mcap" else path
+    given = path(text)
+    return given.parent if given.name == "log.mcap" else given
 
 
 def run(options: argparse.Namespace) -> int:

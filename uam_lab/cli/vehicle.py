@@ -27,7 +27,7 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_lab.cli import vehicle_design, vehicle_import
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, path
 from uam_lab.cli.fly import fly, missed_margins
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.node_options import SettingsError
@@ -42,7 +42,7 @@ def add(command: Command) -> None:
     command.config()
     command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
     text = "result folder (default <out of the lab file>/<time>-<scenario>)"
-    command.option("--out", "DIR", text, type=Path)
+    command.option("--out", "DIR", text, type=path)
     command.switch("--no-report", "leave out the report; uam report makes it later")
     command.switch("--example", "print the template of a lab file, and end")
     command.switch("--systemd", "print the unit that starts this at boot, and end")

@@ -14,11 +14,10 @@ uam fly --vehicle my/quad.yaml. The margins are those of uam margins. Exit statu
 """
 
 import argparse
-from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, load_description
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, path
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
@@ -27,9 +26,9 @@ def add(command: Command) -> None:
     vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
     command.option("name", "NAME|FILE", f"{vehicles}, or the description of a vehicle")
     text = "entries in place of those of config/design/criteria.yaml"
-    command.option("--criteria", "FILE", text, type=Path)
+    command.option("--criteria", "FILE", text, type=path)
     text = "folder of the files (default: that of the vehicle's file; a folder of results for NAME)"
-    command.option("--out", "DIR", text, type=Path)
+    command.option("--out", "DIR", text, type=path)
 
 
 def run(options: argparse.Namespace) -> int:

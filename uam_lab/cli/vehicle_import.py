@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, path
 from uam_lab.records.results.terminal import say
 
 
@@ -41,10 +41,10 @@ def page(_: str) -> str:
 
 
 def add(command: Command) -> None:
-    command.option("file", "FILE", "URDF or MJCF; meshes are found beside it", type=Path)
-    command.option("--out", "DIR", "folder of the files (default ./NAME)", type=Path)
+    command.option("file", "FILE", "URDF or MJCF; meshes are found beside it", type=path)
+    command.option("--out", "DIR", "folder of the files (default ./NAME)", type=path)
     command.option("--name", "NAME", "of the vehicle (default: that of the file)", "")
-    command.option("--answers", "FILE", "answers in YAML, by the keys below", type=Path)
+    command.option("--answers", "FILE", "answers in YAML, by the keys below", type=path)
     command.repeated("--set", "KEY=VALUE", "one answer", dest="answer")
     command.option("--base", "BODY", "body that flies, where several may", "")
     command.option("--arm", "JOINT", "first joint of the arm, where several hang on the base", "")
