@@ -16,7 +16,7 @@ from pathlib import Path
 
 from uam_lab.cli.command import Command, path
 from uam_lab.flights.flight_settings import require_ros
-from uam_lab.records.results.result_folder import ResultFolderError, make_folder, read_json
+from uam_lab.records.results.result_folder import LOG, ResultFolderError, make_folder, read_json
 from uam_lab.records.results.terminal import Terminal, say
 
 # of metrics.json, without which there is no summary
@@ -24,7 +24,7 @@ SHOWN = ("controller", "mission_completed", "duration_s", "rms", "max")
 
 
 def add(command: Command) -> None:
-    text = "result folder of a flight, or its log.mcap"
+    text = f"result folder of a flight, or its {LOG}"
     command.option("directories", "DIR", text, nargs="+", type=_folder)
     text = "result folder (default: the given one; for several flights results/<time>-report)"
     command.option("--out", "DIR", text, type=path)
@@ -37,7 +37,7 @@ def add(command: Command) -> None:
 
 def _folder(text: str) -> Path:
     given = path(text)
-    return given.parent if given.name == "log.mcap" else given
+    return given.parent if given.name == LOG else given
 
 
 def run(options: argparse.Namespace) -> int:
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 def one(options: argparse.Namespace) -> int:
     """Rebuild the report of one flight; return the exit status."""
-    from uam_lab.records.rebuild import LOG, rebuild
+    from uam_lab.records.rebuild import rebuild
     from uam_lab.report.build import build_report
     from uam_lab.report.page.console import reporting, summary
 

@@ -13,9 +13,14 @@ from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latenc
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.outcome import complete
-from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError, known_json
+from uam_lab.records.results.result_folder import (
+    LOG,
+    TABLE,
+    ResultFolder,
+    ResultFolderError,
+    known_json,
+)
 
-LOG, TABLE = "log.mcap", "timeseries.parquet"
 CUT_OFF = "the log ends before the mission was over"
 FILES = ("parameters.yaml", "versions.json")
 PARTIAL = "partial: "

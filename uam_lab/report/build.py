@@ -17,7 +17,7 @@ from uam_control.laws import catalogue
 from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.stability import Stability, analyse_folder
 from uam_lab.records.results import timeseries
-from uam_lab.records.results.result_folder import PX4_LOG, write_json
+from uam_lab.records.results.result_folder import PX4_LOG, TABLE, write_json
 from uam_lab.report.facts import px4_log
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
@@ -48,7 +48,7 @@ def build_report(
     renderer is no error: see Report.problem.
     """
     directory = Path(directory)
-    series = timeseries.read(directory / "timeseries.parquet")
+    series = timeseries.read(directory / TABLE)
     label = catalogue.label(series.info.get("controller") or directory.name)
     with contextlib.ExitStack() as stack:
         # the pictures take longest; they are rendered while this process draws the figures

@@ -25,6 +25,7 @@ from uam_lab.records.results.metrics import plain
 _of_process: dict[Path, FolderClaim] = {}  # claims of commands, to the end of this process
 RESULTS = Path("results")
 LATEST = "latest"
+LOG, TABLE = "log.mcap", "timeseries.parquet"
 PX4_LOG = "px4.ulg"  # of a flight with PX4 in software
 # Distributions whose version can change a flight or its results.
 DISTRIBUTIONS = (
@@ -80,11 +81,11 @@ class ResultFolder:
     def __init__(self, path: Path):
         self.path = path
         self.metrics = path / "metrics.json"
-        self.timeseries = path / "timeseries.parquet"
+        self.timeseries = path / TABLE
         self.parameters = path / "parameters.yaml"
         self.versions = path / "versions.json"
         self.info = path / "info.json"
-        self.log = path / "log.mcap"
+        self.log = path / LOG
         self._latest_before: str | None = None  # where results/latest pointed, None for nowhere
         self._claim: FolderClaim | None = None
 

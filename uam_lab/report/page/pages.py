@@ -9,7 +9,7 @@ from uam_control.profiles.profile import ProfileError
 from uam_lab.records.results import templates
 from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.metrics import PASSED_ON, errors
-from uam_lab.records.results.result_folder import PX4_LOG, read_json
+from uam_lab.records.results.result_folder import LOG, PX4_LOG, TABLE, read_json
 from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import FIGURES
@@ -22,9 +22,9 @@ FACTS = {name: name for name in PASSED_ON if name != "vehicle"}
 FACTS |= {"payload_mass_kg": "payload mass [kg]"}
 
 FILES = (
-    ("log.mcap", "the log of all topics, a bag of ROS 2"),
+    (LOG, "the log of all topics, a bag of ROS 2"),
     (PX4_LOG, "the log of PX4"),
-    ("timeseries.parquet", "one row per control tick"),
+    (TABLE, "one row per control tick"),
     ("metrics.json", "the numbers of this page"),
     ("stability.json", "the stability analysis"),
     ("parameters.yaml", "the parameters of all nodes"),

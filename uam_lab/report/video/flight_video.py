@@ -20,6 +20,7 @@ import numpy as np
 
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.atomic import replacing
+from uam_lab.records.results.result_folder import TABLE
 from uam_lab.records.results.timeseries import Series
 
 SNAPSHOT_SIZE = (1280, 720)
@@ -140,7 +141,7 @@ def snapshot_times(series: Series) -> list[tuple[float, str]]:
 
 def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> None:
     """Render in this process; MUJOCO_GL must be set before its start."""
-    series = timeseries.read(directory / "timeseries.parquet")
+    series = timeseries.read(directory / TABLE)
     report("opening the renderer")
     figures = directory / "figures"
     _snapshots(series, figures, report)
