@@ -115,8 +115,25 @@ def test_a_vehicle_that_its_arm_turns_over_is_refused_at_once():
     """The stowed arm of the S-500 takes 0.16 N m in pitch; 1 % of the largest torque is 0.034."""
     criteria = load_criteria()
     criteria.authority.torque = [0.01, 0.01, 0.9]
-    with pytest.raises(DesignError, match=r"stowed, arm at 0, 90 deg: level hover needs 0.16 N m"):
+    with pytest.raises(DesignError, match=r"stowed, arm at 0, 90 deg: level hover needs 0.162 N m"):
         search.design(load_description("s500_arm"), criteria)
+
+
+@pytest.mark.parametrize(("offset", "payload", "said"), [
+    # 7.5 mm of the arm + 80 mm x 1.772 kg / 2.2 kg
+    (0.08, 0.05, r"stowed, arm at 0, 90 deg.* is 72.0 mm from the .* along x, 70.6 mm are"),
+    # 63.9 mm without, with 0.15 x 2.2 kg at 139 mm (63.9 + 0.15 x 139) / 1.15; 70.6 / 1.15
+    (0.07, 0.15, r"stowed, 0.33 kg, arm at.* is 73.8 mm from the .* along x, 61.4 mm are"),
+])  # fmt: skip
+def test_a_centre_of_mass_beside_the_rotors_is_refused_with_its_distance(offset, payload, said):
+    """3.385 N m of the S-500 in hover, of which the law may have 0.45: 1.523 N m, 70.6 mm x 21.58 N
+    without a payload. What a vehicle cannot hold is known before the search."""
+    criteria, own = load_criteria(), load_description("s500_arm")
+    criteria.payload = payload
+    shift = {"base_offset": [offset, 0.0]}
+    moved = replace(own, numbers=own.numbers | {"variation": own.numbers["variation"] | shift})
+    with pytest.raises(DesignError, match=said):
+        search.design(moved, criteria, pytest.fail)
 
 
 def test_a_servo_that_friction_takes_is_refused_at_once(monkeypatch):

@@ -111,10 +111,12 @@ def inertia_at(body: Body, arm: tuple[float, ...]) -> np.ndarray:
     return np.concatenate([np.diag(mass[ATTITUDE, ATTITUDE] - across), np.diag(mass)[ARM]])
 
 
-def standing_torque(vehicle: Vehicle, arm: tuple[float, ...]) -> np.ndarray:
+def standing_torque(
+    vehicle: Vehicle, arm: tuple[float, ...], payload_mass: float = 0.0
+) -> np.ndarray:
     """Return the torque (3,) [N m] about roll, pitch, yaw with which rotors of different thrust
-    hold the vehicle level; arm (n,) [rad]."""
-    body, described = Body(vehicle), vehicle.description
+    hold the vehicle level; arm (n,) [rad]; payload_mass [kg], in the hand."""
+    body, described = Body(vehicle, payload_mass), vehicle.description
     chi = np.zeros(body.size)
     chi[ARM] = arm
     body.place(chi)
@@ -123,7 +125,8 @@ def standing_torque(vehicle: Vehicle, arm: tuple[float, ...]) -> np.ndarray:
     base = body.model.body("base").id
     centre = body.data.subtree_com[base] - body.data.xpos[base]
     middle = np.mean([rotor.position for rotor in described.rotors], axis=0)
-    return np.cross(centre - middle, [0.0, 0.0, described.mass * described.gravity])
+    weight = (described.mass + payload_mass) * described.gravity
+    return np.cross(centre - middle, [0.0, 0.0, weight])
 
 
 def largest_torque(described: VehicleDescription) -> np.ndarray:

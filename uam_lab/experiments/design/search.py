@@ -82,7 +82,9 @@ def design(
         tried.add(step)
         before = found.summary
         search.mend(found.faults)
-    raise DesignError(f"{described.name}: no gains within {number} rounds: {found.summary}")
+    raise DesignError(
+        f"{described.name}: no gains within {number} rounds: {found.summary}; --criteria"
+    )
 
 
 class Fault(NamedTuple):
@@ -114,8 +116,6 @@ class Search:
         self._described, self._criteria = described, criteria
         vehicle = Vehicle.of(described)
         self.facts = Facts.of(vehicle)
-        self._refuse_unbalanced(vehicle)
-        self._refuse_braked()
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
@@ -123,6 +123,8 @@ class Search:
         loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
         # label, joint angles and payload [kg] of each operating point
         self._points = [*((name, arm, 0.0) for name, arm in poses.items()), loaded]
+        self._refuse_unbalanced(vehicle)
+        self._refuse_braked()
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -131,16 +133,25 @@ class Search:
 
     def _refuse_unbalanced(self, vehicle: Vehicle) -> None:
         """Raise DesignError where level hover takes all torque that the attitude law may give."""
+        described = self._described
         allowed = np.array(self._criteria.authority.torque) * self.facts.torque
-        for label, arm in self.facts.poses.items():
-            needed = np.abs(standing_torque(vehicle, arm))
-            for name, one, most in zip(("roll", "pitch"), needed, allowed, strict=False):
+        for label, arm, mass in self._points:
+            weight = (described.mass + mass) * described.gravity
+            # what is fed forward is that of the vehicle alone, at the thrust that carries both
+            fed = standing_torque(vehicle, arm) * (1.0 + mass / described.mass)
+            needed = np.maximum(np.abs(fed), np.abs(standing_torque(vehicle, arm, mass)))
+            for name, along, one, most in zip(
+                ("roll", "pitch"), "yx", needed, allowed, strict=False
+            ):
                 if one >= most:
                     angles = ", ".join(f"{angle:.0f}" for angle in np.degrees(arm))
                     raise DesignError(
-                        f"{self._described.name}: {label}, arm at {angles} deg: level hover needs "
-                        f"{one:.2g} N m in {name}, the attitude controller may give {most:.2g}: a "
-                        "lighter arm or smaller range, or rotors farther out or stronger"
+                        f"{described.name}: {label}, arm at {angles} deg: level hover needs "
+                        f"{one:.3g} N m in {name}, the attitude controller may give {most:.3g}: "
+                        f"the centre of mass is {1e3 * one / weight:.1f} mm from the middle of the "
+                        f"rotors along {along}, {1e3 * most / weight:.1f} mm are possible: a "
+                        "centre nearer to it, a lighter arm or one of a smaller range, or rotors "
+                        "farther out or stronger"
                     )
 
     def _refuse_braked(self) -> None:
