@@ -9,9 +9,11 @@ from bridge_rig import PERIOD, WEIGHT, read_setpoint
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.offboard.modes import Mode
+from uam_control.setpoints.targets import AttitudeTarget
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.status import MissionStatus
+from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message
 
 
 def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
@@ -33,6 +35,31 @@ def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
     for _ in range(400):
         rig.tick((0, 0, WEIGHT))
     assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
+@pytest.mark.parametrize(
+    ("tau_q", "by_autopilot", "reason"),
+    [
+        ((0, math.nan, 0), False, "/uam/attitude/command: refused /probe (1 messages): effort of"),
+        ((0, math.nan, 0), False, "effort of pitch is nan, not finite; publisher is /probe"),
+        ((0, 0, 0), True, "SET_ATTITUDE_TARGET refused: rates.y is nan, not finite"),
+    ],
+)
+def test_diagnostics_name_topic_and_field_of_what_is_not_finite(
+    make_rig, probe, tau_q, by_autopilot, reason
+):
+    """Of the bridge's inputs, and of a setpoint that another sender gives the autopilot."""
+    reports = probe.collect(topics.DIAGNOSTICS)
+    rig = make_rig()
+    rig.fly()
+    if by_autopilot:
+        bad = AttitudeTarget.of_rates(np.array([0.0, math.nan, 0.0]), 0.5)
+        rig.companion.handle(rig.body.time, setpoint_message(bad, rig.body.time, 1))
+        rig.autopilot_tick()
+    rig.tick((0, 0, WEIGHT), tau_q)
+    probe.until(
+        lambda: any(reason in status.message for one in reports for status in one.status), reason
+    )
 
 
 def test_a_mission_in_failsafe_is_left_to_the_autopilot_down_to_the_ground(make_rig, probe):

@@ -258,7 +258,7 @@ def test_a_state_with_nan_is_refused_and_the_next_one_used(start, probe):
     state = np.zeros((3, 8))
     state[1, 2] = np.nan
     states.publish(writer.fill(PERIOD, state))
-    mission.until_logged("/uam/state: refused /probe (1 messages): velocities of z is nan; publish")
+    mission.until_logged("/uam/state: refused /probe (1 messages): velocities of z is nan, not fin")
     stamp = PERIOD
 
     def answered():

@@ -262,7 +262,7 @@ def test_unusable_messages_of_the_rightful_node_are_named_and_the_next_good_one_
     names = coordinates(3)
     further = {"values": np.zeros((3, len(names))), "writer": TrajectoryWriter(names)}
     for bad, reason in (
-        ({"values": infinite}, "velocities of z is nan"),
+        ({"values": infinite}, "velocities of z is nan, not finite"),
         ({"writer": swapped}, "expected x, y, z, roll, pitch, yaw, alpha_1, alpha_2"),
         ({"writer": unknown}, "joint names x, y, z, roll, pitch, yaw, alpha_1, elbow"),
         (further, "alpha_3; expected x, y, z, roll, pitch, yaw, alpha_1, alpha_2"),

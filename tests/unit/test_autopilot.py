@@ -206,12 +206,14 @@ def test_setpoints_that_are_not_finite_are_refused():
     bench = airborne()
     before = bench.autopilot._setpoint.copy()
     for bad in (math.nan, math.inf):
-        for target in (
-            AttitudeTarget.of_rates(np.array([bad, 0.0, 0.0]), 0.5),
-            AttitudeTarget.of_rates(np.zeros(3), bad),
-            AttitudeTarget.of_attitude(np.array([1.0, 0.0, bad, 0.0]), 0.5),
-        ):
-            assert bench.autopilot.target(bench.time, target) == "not finite"
+        for field, target in {
+            "rates.x": AttitudeTarget.of_rates(np.array([bad, 0.0, 0.0]), 0.5),
+            "thrust": AttitudeTarget.of_rates(np.zeros(3), bad),
+            "quaternion.y": AttitudeTarget.of_attitude(np.array([1.0, 0.0, bad, 0.0]), 0.5),
+            "torque.z": WrenchTarget(np.array([0.0, 0.0, bad]), 0.5),
+        }.items():
+            refused = bench.autopilot.target(bench.time, target)
+            assert refused == f"{field} is {bad}, not finite"
     assert np.all(bench.autopilot._setpoint == before)
     bench.autopilot.target(bench.time, AttitudeTarget.of_rates(np.zeros(3), 7.0))
     assert bench.autopilot._setpoint[3] == 1.0

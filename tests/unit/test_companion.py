@@ -173,14 +173,22 @@ def test_vision_reaches_the_estimate(odometry):
 def test_setpoints_with_another_mask_or_not_finite_are_refused():
     rig = Rig()
     rig.setpoint(0.1, 0.2, 0.3, mask=0)
-    assert any(
-        "type_mask 0, allowed: 128" in clean_text(m.text) for m in rig.received("STATUSTEXT")
-    )
+    told = "".join(clean_text(m.text) for m in rig.received("STATUSTEXT"))
+    assert "SET_ATTITUDE_TARGET refused: type_mask 0, allowed: 128" in told
     assert np.all(rig.autopilot._setpoint == 0.0)
     rig.setpoint(math.nan, 0.0, 0.0, thrust=0.5)
     assert np.all(rig.autopilot._setpoint == 0.0)
     rig.setpoint(0.1, 0.2, 0.3, thrust=0.5)
     assert rig.autopilot._setpoint == pytest.approx([0.1, 0.2, 0.3, 0.5])
+
+
+def test_a_refused_setpoint_is_named_with_message_and_field_every_five_seconds():
+    rig, told = Rig(), []
+    for _ in range(1300):  # 5.2 s: at 0 and at 5 s
+        rig.setpoint(math.nan, 0.0, 0.0, thrust=0.5)
+        told += [text for _, text in rig.autopilot.commander.take_texts()]
+        rig.time += 0.004
+    assert told == ["SET_ATTITUDE_TARGET refused: rates.x is nan, not finite"] * 2
 
 
 def test_messages_for_another_system_are_ignored():

@@ -66,8 +66,8 @@ def test_a_message_carries_it_and_ignored_values_are_zero(mask):
 
 def test_a_setpoint_without_position_or_not_finite_is_refused():
     assert "type_mask 7" in target(mask=7).refused()
-    assert target((math.nan, 0, 0)).refused() == "not finite"
-    assert target(yaw=math.inf).refused() == "not finite"
+    assert target((math.nan, 0, 0)).refused() == "position.x is nan, not finite"
+    assert target(yaw=math.inf).refused() == "yaw is inf, not finite"
 
 
 def test_at_the_setpoint_it_hovers_level():

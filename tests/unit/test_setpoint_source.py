@@ -174,7 +174,9 @@ def test_an_attitude_that_is_not_finite_is_refused_where_it_is_sent():
     source = in_flight(message, setpoint="attitude")
     bad = ATTITUDE * math.nan
     held = source.commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING)
-    assert message[0] == "setpoint refused: not finite" and source.hold.active
+    reason = "quaternion.w is nan, not finite"
+    assert message[0] == f"setpoint refused: {source.refused}" and source.refused == reason
+    assert source.hold.active
     assert desired(held) == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
     assert (
         not in_flight().commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING).refused()

@@ -35,7 +35,7 @@ def test_a_wrench_is_sent_in_frd_within_its_range_and_without_torque_body_rates_
     np.testing.assert_array_equal(target.torque, [0.1, -0.2, 1.0])
     assert np.isnan(target.body_rates).all()
     assert wrench_setpoint(Desired(np.zeros(3), NORTH, 0.6)).type_mask == 128
-    assert target._replace(thrust=math.nan).refused() == "not finite"
+    assert target._replace(thrust=math.nan).refused() == "thrust is nan, not finite"
 
 
 def test_level_is_a_yaw_at_rest():

@@ -76,7 +76,10 @@ def silent(text: str, key: str | None) -> None:
 
 
 class SetpointSource:
-    """Makes the setpoint of a tick from commands, or from the latest state without commands."""
+    """Makes the setpoint of a tick from commands, or from the latest state without commands.
+
+    `refused`: why the setpoint of the newest commands was not sent, "" for a good one.
+    """
 
     def __init__(
         self,
@@ -94,6 +97,7 @@ class SetpointSource:
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
+        self.refused = ""
         self._estimated = -math.inf  # stamp [s] of the estimate
         self.seen = np.array([-math.inf, *(math.nan,) * 4])  # stamp [s] and quaternion of a pose
         self._motion = np.full((3, ALPHA), math.nan)  # estimate
@@ -138,18 +142,19 @@ class SetpointSource:
                 attitude_now, gyro = state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
                 rates, thrust = self.map.map(tau_p, tau_q, attitude_now, gyro)
             except SetpointRefused as error:
-                self._say(f"setpoint refused: {error}", None)
+                self.refused = str(error)
             else:
                 torque = self.map.normalised(tau_q, thrust)
                 desired = Desired(rates, attitude, thrust, reference, torque)
                 setpoint = self.type(desired)
-                refused = setpoint.refused()
-                if not refused:
+                self.refused = setpoint.refused()
+                if not self.refused:
                     self.hold.good(now, desired, situation.followed)
                     return setpoint
-                self._say(f"setpoint refused: {refused}", None)
+            self._say(f"setpoint refused: {self.refused}", None)
         elif not flying and tau_q is None and self._low(now, situation):
             self.hold.reset()
+            self.refused = ""
             return self._idle
         return self.without(now, situation)
 

@@ -23,7 +23,7 @@ MavlinkReceiver.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -76,7 +76,7 @@ class AttitudeTarget(NamedTuple):
 
     def refused(self) -> str:
         """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
-        total = self.thrust + sum(self.rates.tolist())
+        total, fields = self.thrust + sum(self.rates.tolist()), ("rates", "thrust")
         if self.type_mask != RATES:
             if self.type_mask not in (ATTITUDE, ATTITUDE_AND_YAW_RATE):
                 return f"type_mask {self.type_mask}, allowed: {FLOWN}"
@@ -84,8 +84,8 @@ class AttitudeTarget(NamedTuple):
             squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
             if squared == 0.0:
                 return "the attitude is no quaternion"
-            total += squared
-        return "" if math.isfinite(total) else "not finite"
+            total, fields = total + squared, ("quaternion", *fields)
+        return "" if math.isfinite(total) else not_finite(self, fields)
 
 
 class PositionTarget(NamedTuple):
@@ -109,7 +109,8 @@ class PositionTarget(NamedTuple):
         if self.type_mask not in FLOWN_MASKS:
             return f"type_mask {self.type_mask}, allowed: position and yaw with or without the rest"
         total = self.position.sum() + self.velocity.sum() + self.acceleration.sum()
-        return "" if math.isfinite(total + self.yaw + self.yaw_rate) else "not finite"
+        total += self.yaw + self.yaw_rate
+        return "" if math.isfinite(total) else not_finite(self, self._fields)
 
 
 class WrenchTarget(NamedTuple):
@@ -124,7 +125,19 @@ class WrenchTarget(NamedTuple):
 
     def refused(self) -> str:
         """Return why no autopilot should fly it: what is not finite; "" if nothing."""
-        return "" if math.isfinite(self.torque.sum() + self.thrust) else "not finite"
+        total = self.torque.sum() + self.thrust
+        return "" if math.isfinite(total) else not_finite(self, self._fields)
+
+
+def not_finite(target: NamedTuple, fields: Iterable[str]) -> str:
+    """Return which of the target's `fields` is not finite; the sum of all of them is not."""
+    for field in fields:
+        values = np.atleast_1d(getattr(target, field))
+        axes = [f".{axis}" for axis in "wxyz"[-values.size :]] if values.size > 1 else [""]
+        for axis, value in zip(axes, values.tolist(), strict=True):
+            if not math.isfinite(value):
+                return f"{field}{axis} is {value}, not finite"
+    return "the sum of its numbers is not finite"
 
 
 @dataclass(slots=True)

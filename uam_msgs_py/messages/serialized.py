@@ -109,10 +109,9 @@ class Serialized:
         return np.frombuffer(self.data, "<f8", length, self.layout.fields[field].start)
 
     def vector(self, field: str) -> np.ndarray:
-        """Return a copy (n,) of a field of numbers; raises BadMessage unless all are finite."""
+        """Return a copy (3,) of a vector's numbers; raises BadMessage unless all are finite."""
         values = self.numbers(field).copy()
-        if not all_finite(values):
-            raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
+        refuse_infinite(field, values, "xyz")
         return values
 
 
@@ -152,9 +151,9 @@ def check_length(what: str, length: int, names: Sequence[str]) -> None:
 
 
 def refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
-    """Raise BadMessage unless all values (n,) of the joints `names` (n) are finite."""
+    """Raise BadMessage unless all values (n,) of the coordinates `names` (n) are finite."""
     if not all_finite(values):
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
-                raise BadMessage(f"{what} of {name} is {value}")
-        raise BadMessage(f"{what} overflow")
+                raise BadMessage(f"{what} of {name} is {value}, not finite")
+        raise BadMessage(f"the sum of {what} is not finite")

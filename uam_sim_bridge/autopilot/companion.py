@@ -22,6 +22,7 @@ from uam_sim_bridge.mavlink.protocol.setpoint_messages import (
 )
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
+REPEAT = 5.0  # [s] from one text about a refused message to the next of the same wording
 _PARAMETERS_PER_TICK = 10
 _REAL, _INTEGER = mavlink2.MAV_PARAM_TYPE_REAL32, mavlink2.MAV_PARAM_TYPE_INT32
 _POSE_FRAMES = (mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_LOCAL_FRD)
@@ -37,7 +38,7 @@ class Companion:
         self.out: list[Message] = []
         self._listing: list[str] = []
         self._texts = 0
-        self._said: set[str] = set()
+        self._said: dict[str, float] = {}  # text → time [s] of the last one
         self._handlers = {
             "SET_ATTITUDE_TARGET": self._attitude_target,
             "SET_POSITION_TARGET_LOCAL_NED": self._position_target,
@@ -74,27 +75,29 @@ class Companion:
         out, self.out = self.out, []
         return out
 
-    def _say_once(self, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
+    def _refuse(self, time: float, m: Message, reason: str) -> None:
+        """Say which message was refused and why, again only after REPEAT."""
+        text = f"{m.get_type()} refused: {reason}"
+        if time - self._said.get(text, -math.inf) >= REPEAT:
+            self._said[text] = time
             self._autopilot.commander.texts.append((Severity.WARNING, text))
 
     def _attitude_target(self, time: float, m: Message) -> None:
-        self._target(time, attitude_target(m))
+        self._target(time, m, attitude_target(m))
 
     def _position_target(self, time: float, m: Message) -> None:
         local = m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED
         wrong = "" if local else f"frame {m.coordinate_frame}, local NED expected"
-        self._target(time, position_target(m), wrong)
+        self._target(time, m, position_target(m), wrong)
 
     def _wrench_target(self, time: float, m: Message) -> None:
         wrong = "" if m.group_mlx == GROUP else f"group {m.group_mlx}, {GROUP} expected"
-        self._target(time, wrench_target(m), wrong)
+        self._target(time, m, wrench_target(m), wrong)
 
-    def _target(self, time: float, target: Target, wrong: str = "") -> None:
-        """Pass a setpoint on; wrong: why not, "" for nothing."""
+    def _target(self, time: float, m: Message, target: Target, wrong: str = "") -> None:
+        """Pass a setpoint of the message `m` on; wrong: why not, "" for nothing."""
         if refused := wrong or self._autopilot.target(time, target):
-            self._say_once(f"setpoint refused: {refused}")
+            self._refuse(time, m, refused)
 
     def _vision_position(self, time: float, m: Message) -> None:
         euler = np.array([m.roll, m.pitch, m.yaw])
@@ -106,7 +109,7 @@ class Companion:
     def _odometry(self, time: float, m: Message) -> None:
         position, quaternion = np.array([m.x, m.y, m.z]), np.array(m.q, dtype=float)
         if m.frame_id not in _POSE_FRAMES:
-            self._say_once(f"odometry refused: frame {m.frame_id}, local NED or FRD expected")
+            self._refuse(time, m, f"frame {m.frame_id}, local NED or FRD expected")
         else:
             self._autopilot.vision(time, position, quaternion, age_by(1e-6 * m.time_usec, time))
 

@@ -327,6 +327,8 @@ class MavlinkBridgeNode(UamNode):
         magnet = self._magnet
         notes = (*sequence.reasons, *faults(link), *link.warnings)
         notes += () if magnet is None else magnet.problems()
+        if refused := self.stage.source.refused:
+            notes += (f"setpoint refused: {refused}",)
         values = {
             "sequence": sequence.phase.value,
             "in control": sequence.in_control,
