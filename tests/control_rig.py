@@ -9,7 +9,7 @@ from uam_control.offboard.sequence import OffboardSequence
 from uam_control.profiles.profile import default_profile
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.control_tick import ControlTick
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.vehicle import load_description
 
 PERIOD = 4_000_000  # [ns]

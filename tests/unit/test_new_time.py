@@ -10,7 +10,7 @@ from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import Phase
 from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import State
 from uam_control.vehicle import derived_parameters, load_description

@@ -26,7 +26,7 @@ from uam_control.stages.supervisor_inputs import (
     PAYLOAD,
     SupervisorInputs,
 )
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_sim_bridge.autopilot.core import Autopilot

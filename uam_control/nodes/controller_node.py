@@ -15,8 +15,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.law_stages import LawStage
-from uam_control.stages.tick_stamps import carried, serves
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing, carried, serves
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (

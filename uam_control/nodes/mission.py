@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Bool, Float64
 
 from uam_control.coordinates import ARM, ATTITUDE, CHI
@@ -36,7 +35,7 @@ from uam_control.profiles.profile import (
 )
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, State
 from uam_control.supervision.inputs import SUBSYSTEMS
@@ -68,6 +67,7 @@ PATH_STEP = 0.25  # [s] between two poses of the path
 PATH_LENGTH = 250.0  # [s] of the flight in it: a tick must not wait for the path of hours
 HAND_PERIOD = 20_000_000  # [ns] between two references of the end effector
 WATCH_PERIOD = 0.05  # [s] of the watch on states
+ODD = State.HOLDING, State.RELEASED
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,7 @@ class MissionNode(UamNode):
         self._state_timeout = NodeParameters(self, StateWatch, read_only=True).current.state_timeout
         self._state_at = math.inf  # [s] time.monotonic() of the newest state
         if self._state_timeout:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(WATCH_PERIOD, self._watch_states, clock=steady)
+            self.every(WATCH_PERIOD, self._watch_states)
 
         self._reference = self.publisher(topics.REFERENCE)
         self._magnet = self.publisher(topics.MAGNET)
@@ -318,11 +317,7 @@ class MissionNode(UamNode):
         output = self._mission.output
         text = f"{output.phase} at {output.time:.3f} s; {output.state.value}: {output.cause}"
         text += ", done" if output.done else ""
-        # two calls: rclpy requires one severity per line of code
-        if output.abort_reason or output.state in (State.HOLDING, State.RELEASED):
-            self.get_logger().warning(text)
-        else:
-            self.get_logger().info(text)
+        self.note(text, bool(output.abort_reason) or output.state in ODD)
 
     def _log_held_back(self) -> None:
         """Log once which limit prevents the take-off, and that it does no longer."""
@@ -335,20 +330,16 @@ class MissionNode(UamNode):
     def _log_grasp(self) -> None:
         output = self._mission.output
         text = f"payload {output.grasp.value}, approach {output.attempt}: {output.grasp_text}"
-        if output.grasp in (Grasp.GIVEN_UP, Grasp.LOST, Grasp.STUCK):
-            self.get_logger().warning(text)
-        else:
-            self.get_logger().info(text)
+        self.note(text, output.grasp in (Grasp.GIVEN_UP, Grasp.LOST, Grasp.STUCK))
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         output, beyond = self._mission.output, self._mission.checks.beyond
-        odd = output.state in (State.HOLDING, State.RELEASED)
         limits, delay = self.parameter_set.current, self._mission.checks.setpoint_delay
         slower, late = self.stage.inputs.readings.slower, ""
         if delay > limits.delay_warn * limits.delay_margin:
             share = 100.0 * margin_left(delay, limits)
             late = f"setpoints {1e3 * delay:.0f} ms late: {share:.0f} % of the delay margin left"
-        level = WARN if beyond or odd or late else OK
+        level = WARN if beyond or output.state in ODD or late else OK
         if output.abort_reason:
             level = ERROR
         summary = output.abort_reason or beyond or late or output.phase

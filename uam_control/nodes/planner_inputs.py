@@ -146,11 +146,6 @@ class PlannerInputs:
             if accepted in logged and 0 <= now - logged[accepted] < LOG_PERIOD:
                 return  # a stream of goals
             logged[accepted] = now
-            log = self._node.get_logger()
-            # two calls: rclpy requires one severity per line of code
-            if accepted:
-                log.info(self.answer)
-            else:
-                log.warning(self.answer)
+            self._node.note(self.answer, not accepted)
 
         self._node.listen(topic, handle, required=False, qos=topic.qos, raw=True)

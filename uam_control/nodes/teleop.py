@@ -7,7 +7,6 @@ from functools import partial
 
 from geometry_msgs.msg import TwistStamped
 from rcl_interfaces.srv import GetParameters
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import Joy
@@ -113,8 +112,7 @@ class TeleopNode(UamNode):
         self._teleop = Teleop(self, mapping, self.get_logger().info)
         self._problem = ""
         self.listen(topics.JOY, self._on_joy)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / mapping.rate, self._teleop.tick, clock=steady)
+        self.every(1.0 / mapping.rate, self._teleop.tick)
 
     def _on_joy(self, message: Joy) -> None:
         begun = time.perf_counter()

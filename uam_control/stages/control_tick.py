@@ -52,7 +52,7 @@ from uam_control.stages.signals import (
 )
 from uam_control.stages.step import ASK, DECIDE, DONE, ENDED, Stage, Step
 from uam_control.stages.supervisor_inputs import BIAS, GAINS, LIFT, keep, read_inputs
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stages.vision_pacing import take_pose
 from uam_control.stamps import SECOND
 from uam_control.supervision import State

@@ -22,7 +22,7 @@ from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Flag, put, record
 from uam_control.stages.step import DECIDE, DONE
 from uam_control.stages.supervisor_inputs import GAINS, StageArrays, keep
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND
 
 REPORT_DELAY = 200_000_000  # [ns] after which a report of a tick has arrived at every stage

@@ -14,8 +14,7 @@ from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
 from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs
-from uam_control.stages.tick_stamps import carried, serves
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing, carried, serves
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, Readings, State
 from uam_control.supervision.observation import ReadingArrays

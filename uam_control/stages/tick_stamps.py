@@ -15,10 +15,13 @@ has another stamp if an IMU sample is missing or the IMU's clock drifts. This re
 too, carried on by its own rates; the error is of third order in the difference.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Number, record
+from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
 
 MISSING = 0.75  # [periods] of delay from which the sample before is counted as missing
@@ -30,6 +33,18 @@ OTHER_RATE = 0.1  # relative difference of the measured period from which stamps
 # sample: stamp [ns] of the newest one; kept: how many were kept in the window; difference [ns]:
 # mean of sample - tick
 WHOLE, REAL = "period stamp sample repeated missing kept", "difference"
+
+
+@dataclass(frozen=True)
+class Timing(ParameterSet):
+    """Parameters of the control ticks."""
+
+    control_period: float = number(0.004, "time between two control ticks", "s", 1e-4, 0.1)
+
+    @property
+    def period(self) -> int:
+        """The control period [ns]."""
+        return round(self.control_period * SECOND)
 
 
 class TickStamps:

@@ -74,9 +74,12 @@ class UamNode(TunableNode):
         self._waiting: list[str] = []  # required inputs without a message in the last LOG_PERIOD
         self.guards_end = False  # see `destroy_node`
         self._diagnostics = self.publisher(topics.DIAGNOSTICS)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
+        self.every(LOG_PERIOD, self._check_inputs)
+        self.every(DIAGNOSTICS_PERIOD, self._report)
+
+    def every(self, period: float, call: Callable[[], None]) -> None:
+        """Call `call()` every `period` [s] of the machine's steady clock."""
+        self.create_timer(period, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publisher(self, topic: Topic) -> Publisher:
         """Return a publisher of `topic`."""
@@ -155,6 +158,13 @@ class UamNode(TunableNode):
         """Act on complete ticks; called after all received messages are delivered."""
         for join in self.joins:
             join.settle()
+
+    def note(self, text: str, odd: bool) -> None:
+        """Log a text; odd: as a warning. rclpy requires one severity per line of code."""
+        if odd:
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().info(text)
 
     def warn(self, text: str, key: str | None = None) -> None:
         """Log a warning, at most once per LOG_PERIOD for each `key` (default: the text)."""

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -126,8 +125,7 @@ class MavlinkBridgeNode(UamNode):
         self._kill_until = -math.inf  # [s] wall time
         self.create_service(Trigger, "mission/kill", self._on_kill)
         if options.clock == "realtime":
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
+            self.every(WATCH_PERIOD, self._watch)
 
     def _configure(self, parameters: RateThrustParameters) -> None:
         self.stage.map.configure(parameters)

@@ -6,8 +6,6 @@ timer. A body that is lost leaves its topic silent; the diagnostics say why.
 
 import time
 
-from rclpy.clock import Clock, ClockType
-
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_msgs_py.messages import topics
@@ -52,8 +50,7 @@ class MocapDriverNode(UamNode):
         self._vehicle = self.publisher(topics.MOCAP)
         self._payload = self.publisher(topics.PAYLOAD) if parameters.payload else None
         self._said = ""
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(SAY_PERIOD, self._say, clock=steady)
+        self.every(SAY_PERIOD, self._say)
 
     def settle(self) -> None:
         """Publish the poses that arrive within WAIT."""

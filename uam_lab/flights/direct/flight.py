@@ -14,7 +14,7 @@ from uam_control.offboard.sequence import OffboardSequence
 from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_control.stages.control_tick import ControlTick
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.compiled_ticks import CompiledTicks
 from uam_lab.flights.direct.record import TickRecorder

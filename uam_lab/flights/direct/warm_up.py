@@ -26,7 +26,7 @@ from uam_control.setpoints.targets import VisionPose
 from uam_control.stages.bridge_stage import sending
 from uam_control.stages.control_tick import ControlTick
 from uam_control.stages.law_stages import arm_step, attitude_step, position_step
-from uam_control.stages.timing import Timing
+from uam_control.stages.tick_stamps import Timing
 from uam_control.vehicle import chain_of
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
