@@ -241,6 +241,16 @@ def test_the_same_numbers_give_the_same_design(designed, tmp_path):
         assert (tmp_path / name).read_text() == (designed[0].parent / name).read_text()
 
 
+@pytest.mark.long  # ten seconds of a search
+def test_a_vehicle_that_derives_flies_with_its_own_design_at_once(designed, tmp_path, capsys):
+    """The gains that it derives no longer count, so nothing is asked of the user."""
+    file = tmp_path / "other.yaml"
+    file.write_text(f"derives: {designed[0]}\n")
+    assert main(["vehicle", "design", str(file)]) == 0
+    assert load_description(file).profile("modular") == str(tmp_path / "other_profile.yaml")
+    assert "flies with these gains after" not in capsys.readouterr().out
+
+
 def test_files_of_a_person_are_not_replaced(designed, tmp_path, capsys):
     own = tmp_path / "small_profile.yaml"
     own.write_text(yaml.safe_dump({"mission": {"ros__parameters": {}}}))

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     say(files.table(made))
     for file in written.values():
         say(f"written  {file}")
-    numbers = described.numbers
+    numbers = load_description(options.name).numbers  # one that derives has its own design now
     if folder is not None or "profiles" in numbers or "autopilot" in numbers:
         say(
             f"{described.file.name} flies with these gains after: profiles: {{modular: "
