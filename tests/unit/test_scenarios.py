@@ -188,7 +188,10 @@ def test_a_lap_that_is_too_short_for_the_usual_ramp_has_one_of_half_its_length(t
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("trajectory: {kind: square}", "trajectory.kind: 'square' is not one of circle, ellipse"),
+        (
+            "trajectory: {kind: square}",
+            "kind: 'square' is not one of circle, ellipse, lemniscate, waypoints, end_effector",
+        ),
         ("trajectory: {kind: circle, radius: 1, size: [1, 1]}", "size: unknown"),
         ("trajectory: {kind: circle, radius: 1, height: 1}", "period: exactly one of period"),
         ("trajectory: {kind: circle, radius: 0, height: 1}", "radius: 0 is not above 0"),

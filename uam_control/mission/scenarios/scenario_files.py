@@ -14,7 +14,7 @@ from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios import hand_kind
 from uam_control.mission.scenarios.csv_file import from_csv
 from uam_control.mission.scenarios.environment import ENVIRONMENT, read_environment
-from uam_control.mission.scenarios.reference_kinds import Middle, legs
+from uam_control.mission.scenarios.reference_kinds import KINDS, Middle, legs
 from uam_control.mission.scenarios.route import Route
 from uam_control.mission.scenarios.scenario import (
     Landing,
@@ -133,7 +133,7 @@ def _along_route(
     if "at" in entry.values:
         raise entry.error("at", "only with moves and landing")
     start = standing(arm_start)
-    if entry.values.get("kind") == hand_kind.KIND:
+    if entry.one_of("kind", (*KINDS, hand_kind.KIND)) == hand_kind.KIND:
         source = hand_kind.hand_source(entry, vehicle, file.parent)
         route = Route(source.legs(), end, options, source=source)
     else:
