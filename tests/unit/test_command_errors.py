@@ -1,5 +1,7 @@
 """What a command refuses is one line; a mistake of the program is raised."""
 
+import subprocess
+import sys
 from argparse import Namespace
 
 import pytest
@@ -25,6 +27,43 @@ def test_an_error_of_the_project_or_the_system_is_one_line(capsys):
 def test_a_mistake_of_the_program_is_raised():
     with pytest.raises(ZeroDivisionError):
         run(Namespace(command="fly", run=lambda _: 1 / 0))
+
+
+def test_an_import_that_ctrl_c_ends_is_an_interrupt_whatever_it_says(capsys):
+    def interrupted(_):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise ImportError("initialization failed") from error
+
+    assert run(Namespace(command="margins", run=interrupted)) == 130
+    assert capsys.readouterr().err == "uam margins: interrupted\n"
+
+
+def test_processes_that_begin_with_a_command_do_not_hear_ctrl_c():
+    """MuJoCo's import starts one; the terminal's Ctrl-C is sent to all, and its words are Python's.
+
+    The command still hears it.
+    """
+    program = """
+import signal, subprocess
+
+heard, start = [], subprocess.Popen.__init__
+
+def counted(*arguments, **options):
+    heard.append(signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+    start(*arguments, **options)
+
+subprocess.Popen.__init__ = counted
+from uam_lab.cli.main import main
+
+try:
+    main(["margins", "--help"])
+finally:
+    print(heard.count(True), signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "0 False", done.stderr
 
 
 def test_an_empty_name_is_not_the_present_folder(capsys):

@@ -108,11 +108,12 @@ def run(options: argparse.Namespace) -> int:
         if lost := output.reason():
             say(f"uam {options.command}: stdout: {lost}: lines are missing", error=True)
         return status or (NOT_WRITTEN if lost else 0)
-    except KeyboardInterrupt:
-        say(f"uam {options.command}: interrupted", error=True)
-        return INTERRUPTED
-    except Exception as error:
-        if not (isinstance(error, OSError) or type(error).__module__.startswith(OURS)):
+    except BaseException as error:
+        expected = isinstance(error, OSError) or type(error).__module__.startswith(OURS)
+        if not expected and _interrupted(error):
+            say(f"uam {options.command}: interrupted", error=True)
+            return INTERRUPTED
+        if not expected:
             raise
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
@@ -121,6 +122,13 @@ def run(options: argparse.Namespace) -> int:
         more = f" … ({len(text)} characters)" if len(text) > LONGEST_ERROR else ""
         say(f"uam {options.command}: {text[:LONGEST_ERROR]}{more}", error=True)
         return WRONG_USE
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Return whether Ctrl-C is behind an error: an import that it ends may fail in other words."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _full(error: OSError) -> str:

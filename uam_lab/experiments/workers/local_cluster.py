@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import dask.config
 from distributed import LocalCluster
 
-from uam_lab.flights.processes.child import SINGLE_THREAD
+from uam_lab.flights.processes.child import SINGLE_THREAD, blocked
 
 HOST = "127.0.0.1"
 CLOSING = 5.0  # [s] for idle workers to end
@@ -35,10 +35,8 @@ def local_cluster(jobs: int) -> Iterator[LocalCluster]:
     process, however it ends: each monitors a pipe to it.
     """
     with dask.config.set(SETTINGS):
-        # Threads inherit the mask of the thread that starts them, and processes too: Ctrl-C in the
-        # terminal then reaches this process only.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
+        # so Ctrl-C in the terminal reaches this process only
+        with blocked(signal.SIGINT):
             cluster = LocalCluster(
                 n_workers=jobs,
                 threads_per_worker=1,
@@ -48,8 +46,6 @@ def local_cluster(jobs: int) -> Iterator[LocalCluster]:
                 memory_limit=0,  # none: a flight needs little
                 silence_logs=logging.CRITICAL,
             )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         try:
             yield cluster
         except BaseException:

@@ -70,6 +70,17 @@ def borrowed(environment: Mapping[str, str]) -> Iterator[None]:
                     os.environ[name] = value
 
 
+@contextlib.contextmanager
+def blocked(*signals: int) -> Iterator[None]:
+    """Let signals wait within the `with` block; they do not reach processes and threads that start
+    in it: Ctrl-C in the terminal is sent to all processes of the command."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _without_main(name: str) -> dict[str, Any]:
     """Return what a child process is prepared by; a node does not import the user's program.
 
@@ -94,11 +105,8 @@ def prepare(modules: Iterable[str]) -> None:
     with borrowed(SINGLE_THREAD):
         _context.set_forkserver_preload([__name__, *modules])
         multiprocessing.resource_tracker.ensure_running()  # its start unblocks the signal
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
-        try:
+        with blocked(signal.SIGINT, signal.SIGHUP):
             multiprocessing.forkserver.ensure_running()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def prepare_early(modules: Iterable[str]) -> None:
