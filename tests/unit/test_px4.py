@@ -1,6 +1,7 @@
 """Search for PX4, its parameters, its log and process; a shell script replaces PX4."""
 
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -102,6 +103,17 @@ def test_a_build_without_its_startup_script_is_refused(build):
     (build / "etc" / "init.d-posix" / "rcS").unlink()
     with pytest.raises(Px4Error, match="holds no PX4 build"):
         Px4Installation.find(build)
+
+
+def test_of_the_sources_builds_the_one_that_the_use_needs_is_taken(build):
+    sources = build.parent.parent
+    with pytest.raises(Px4Error, match="holds no PX4 build: .*`make px4_sitl_nolockstep`"):
+        Px4Installation.in_the_loop(sources)
+    other = shutil.copytree(build, build.with_name("px4_sitl_nolockstep"))
+    (build / "px4_boardconfig.h").write_text("#define CONFIG_BOARD_LOCKSTEP 1\n")
+    (other / "px4_boardconfig.h").write_text("#define CONFIG_BOARD_NOLOCKSTEP 1\n")
+    assert Px4Installation.in_the_loop(sources).directory == other
+    assert Px4Installation.find(sources).directory == build
 
 
 def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():

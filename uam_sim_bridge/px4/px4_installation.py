@@ -23,7 +23,7 @@ _STARTUP = "etc/init.d-posix/rcS"
 _LISTED = "parameters.json"
 _BOARD, _OWN_CLOCK = "px4_boardconfig.h", "CONFIG_BOARD_NOLOCKSTEP 1"
 _GRIPPER = "CONFIG_MODULES_PAYLOAD_DELIVERER 1"
-_IN_SOURCES = "build/px4_sitl_default"
+_WITH_LOCKSTEP, _IN_LOOP = "build/px4_sitl_default", "build/px4_sitl_nolockstep"  # in the sources
 
 
 class Px4Error(ValueError):
@@ -104,9 +104,11 @@ class Px4Installation:
     def in_the_loop(cls, directory: str | Path | None = None) -> Px4Installation:
         """Return the build without lockstep in `directory`; None: that of PX4_HITL_DIR.
 
-        Raises Px4Error.
+        For PX4's source directory it returns the build in build/px4_sitl_nolockstep. Raises
+        Px4Error.
         """
-        found = cls._found(directory or os.environ.get(LOOP_VARIABLE), _REQUIRED_IN_LOOP)
+        given = directory or os.environ.get(LOOP_VARIABLE)
+        found = cls._found(given, _IN_LOOP, _REQUIRED_IN_LOOP)
         found.require_own_clock()
         return found
 
@@ -116,14 +118,14 @@ class Px4Installation:
 
         For PX4's source directory it returns the build in build/px4_sitl_default. Raises Px4Error.
         """
-        return cls._found(directory or os.environ.get(VARIABLE), REQUIRED)
+        return cls._found(directory or os.environ.get(VARIABLE), _WITH_LOCKSTEP, REQUIRED)
 
     @classmethod
-    def _found(cls, given: str | Path | None, required: str) -> Px4Installation:
+    def _found(cls, given: str | Path | None, in_sources: str, required: str) -> Px4Installation:
         if not given:
             raise Px4Error(f"no PX4 build given: set {required}")
         base = Path(given).expanduser().absolute()
-        for place in (base, base / _IN_SOURCES):
+        for place in (base, base / in_sources):
             found = cls(place)
             if os.access(found.binary, os.X_OK) and (place / _STARTUP).is_file():
                 return found
