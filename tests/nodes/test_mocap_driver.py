@@ -11,7 +11,7 @@ from tracked_vehicle import TrackedBody
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_pose
-from uam_sim_bridge.devices.mocap.calibration import Calibration, load, write
+from uam_sim_bridge.devices.mocap.calibration import Calibration, load, text
 
 MODULE, NAME = "uam_sim_bridge.nodes.mocap_driver", "mocap_driver"
 POSITION = np.array([0.5, -1.0, 1.2])
@@ -35,7 +35,7 @@ def calibration(tmp_path):
     """A measured calibration of that body."""
     file = tmp_path / "lab.yaml"
     body = load("motive_y_up").body
-    write(Calibration("y", 0.0, (0.0,) * 3, body, PIVOT, {"distance_m": 1.0}), file)
+    file.write_text(text(Calibration("y", 0.0, (0.0,) * 3, body, PIVOT, {"distance_m": 1.0})))
     return str(file)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import re
 import struct
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -398,6 +400,22 @@ def test_a_name_that_leaves_the_folder_or_the_printed_command_is_refused(tmp_pat
     assert run(parsed(["vehicle", "import", str(file), "--out", str(out), "--name", name])) == 2
     assert "--name: " in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("kind", [".xml", ".yaml", ".txt"])
+def test_a_full_disk_leaves_no_part_of_a_file(tmp_path, capsys, monkeypatch, kind):
+    file, out = write(tmp_path, drone()), tmp_path / "o"
+    whole = Path.write_text
+
+    def until_it_is_full(self, text, **how):
+        whole(self, text[:10] if self.suffix == kind else text, **how)
+        if self.suffix == kind:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", until_it_is_full)
+    assert run(parsed(["vehicle", "import", str(file), "--out", str(out), "--no-questions"])) == 1
+    assert f"mine{kind} is not written, no space left on device" in capsys.readouterr().err
+    assert not [*out.glob(f"*{kind}"), *out.glob(".*")]
 
 
 def test_the_command_writes_files_and_a_picture_once(tmp_path, capsys):

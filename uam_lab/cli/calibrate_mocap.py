@@ -29,6 +29,7 @@ from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_descri
 from uam_lab.cli.command import Command, number, path
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
+from uam_lab.records.results.atomic import replacing, write_text
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.mocap.mocap_parameters import (
     LIBRARY,
@@ -88,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
     level, ahead = (measurement.still(poses, what) for what, poses in found.items())
     heading = math.radians(options.heading)
     made = fit(level, ahead, options.up, heading, standing, options.pivot)
-    calibration.write(made, options.out)
+    write_text(options.out, calibration.text(made))
     _say(made, options)
     return 0
 
@@ -156,9 +157,10 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     finally:
         source.close()
         if options.save and found:
-            measurement.write_poses(
-                options.save, [pose for poses in found.values() for pose in poses]
-            )
+            with replacing(options.save) as temporary:
+                measurement.write_poses(
+                    temporary, [pose for poses in found.values() for pose in poses]
+                )
     return found
 
 

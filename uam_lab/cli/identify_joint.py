@@ -25,6 +25,7 @@ from uam_control.arm.kinematics import gravity_torque
 from uam_control.vehicle import chain_of
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, number
+from uam_lab.records.results.atomic import replacing, write_text
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.excitation import ExcitationParameters
@@ -84,10 +85,11 @@ def run(options: argparse.Namespace) -> int:
     finally:
         driver.stop()
     text = pasted(options.joint, driver.chain.arm[joint].torque_scale, fit)
-    (out / "identification.yaml").write_text(text, encoding="utf-8")
+    write_text(out / "identification.yaml", text)
     columns = (record.times, record.position[:, joint], record.effort[:, joint], loads)
     head = "time_s,angle_rad,effort_nm,weight_nm"
-    np.savetxt(out / "samples.csv", np.column_stack(columns), "%.6f", ",", header=head, comments="")
+    with replacing(out / "samples.csv") as temporary:
+        np.savetxt(temporary, np.column_stack(columns), "%.6f", ",", header=head, comments="")
     draw(out / "friction.png", options.joint, fit)
     say(text, end="")
     say(f"residual {fit.residual:.4f} N m, inertia {fit.inertia:.4f} kg m^2")

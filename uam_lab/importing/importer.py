@@ -17,6 +17,7 @@ from uam_lab.importing.mjcf_text import MjcfText
 from uam_lab.importing.source import ImportRefused, Source, kind_of, tree
 from uam_lab.importing.standing import Stance, stand
 from uam_lab.importing.structure import BASE, Chosen, Parts, find
+from uam_lab.records.results.atomic import write_text
 from uam_sim_bridge.plant import Vehicle
 
 SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone
@@ -71,7 +72,7 @@ def import_vehicle(
     written = folder / f"{name}.yaml"
     head = f"# {name}: imported from {file.name} by uam vehicle import. SI units, frames FLU.\n"
     head += "# Behind each number: where it comes from.\n"
-    written.write_text(head + "".join(lines(tree_of_numbers)), encoding="utf-8")
+    write_text(written, head + "".join(lines(tree_of_numbers)))
     description = load_description(written)
     Vehicle.of(description).compile(0.0)
     found = tuple(_found(parts, stance, mount))
@@ -79,7 +80,7 @@ def import_vehicle(
     if stance.legs.value:
         missing += (f"landing gear: {stance.legs}",)
     text = "\n".join(("found:", *found, "", "missing or assumed:", *missing, ""))
-    (folder / f"{name}.txt").write_text(text, encoding="utf-8")
+    write_text(folder / f"{name}.txt", text)
     return Imported(description, found, missing)
 
 

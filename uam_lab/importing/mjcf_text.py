@@ -1,6 +1,5 @@
 """The vehicle's MJCF: base and arm of the file as bodies of this project, and its own magnet."""
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from uam_lab.importing import geometry
 from uam_lab.importing.source import XmlElement
 from uam_lab.importing.standing import Stance
 from uam_lab.importing.structure import OWN, Parts
+from uam_lab.records.results.atomic import copy, write_text
 
 INCLUDED = ("world.xml", "sensors.xml", "magnet.xml")
 XM430 = 3.0  # [N m] its stall torque; its dynamics are those of parts/world.xml
@@ -45,7 +45,7 @@ class MjcfText:
         """Write NAME.xml, parts/ and meshes/; return the file."""
         (self.folder / "parts").mkdir(parents=True, exist_ok=True)
         for part in INCLUDED:
-            shutil.copy(configuration.path(f"vehicle/parts/{part}"), self.folder / "parts" / part)
+            copy(configuration.path(f"vehicle/parts/{part}"), self.folder / "parts" / part)
         root = etree.Element("mujoco", model=name)
         etree.SubElement(root, "include", file="parts/world.xml")
         assets = etree.SubElement(root, "asset")
@@ -64,7 +64,7 @@ class MjcfText:
         etree.indent(root)
         file = self.folder / f"{name}.xml"
         head = f"<!-- {self.parts.source.file.name}, imported by uam vehicle import. -->\n"
-        file.write_text(head + etree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+        write_text(file, head + etree.tostring(root, encoding="unicode") + "\n")
         return file
 
     def _arm(self, base: XmlElement) -> None:
@@ -164,7 +164,7 @@ class MjcfText:
             file = self.parts.source.meshes[name]
             kept = f"{name}{file.suffix.lower()}"
             (self.folder / "meshes").mkdir(exist_ok=True)
-            shutil.copy(file, self.folder / "meshes" / kept)
+            copy(file, self.folder / "meshes" / kept)
             scale = text(model.mesh_scale[mesh])
             self._assets[name] = {"name": name, "file": f"meshes/{kept}", "scale": scale}
             self._assets[name] |= {"inertia": "shell"}

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from uam_lab.records.results.atomic import replacing
+
 if TYPE_CHECKING:
     import mujoco
 
@@ -67,7 +69,8 @@ def main(name: str, file: str) -> None:
     plant.model.vis.map.znear = NEAREST * camera.distance / plant.model.stat.extent
     with mujoco.Renderer(plant.model, *SIZE) as renderer:
         renderer.update_scene(plant.data, camera)
-        Image.fromarray(renderer.render()).save(file)
+        with replacing(Path(file)) as temporary:
+            Image.fromarray(renderer.render()).save(temporary)
 
 
 if __name__ == "__main__":

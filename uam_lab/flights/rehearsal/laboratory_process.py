@@ -130,7 +130,7 @@ def required_parameters(px4: Px4Installation | None, logs: Path) -> dict[str, An
     sections = yaml_file.read(configuration.path(REQUIRED), ConfigurationError)
     sections["needed"]["SYS_HITL"] = {"is": 1, "why": "in the loop, in a rehearsal"}
     file = logs / IN_THE_LOOP
-    file.write_text(yaml.safe_dump(sections, sort_keys=False), encoding="utf-8")
+    write_text(file, yaml.safe_dump(sections, sort_keys=False))
     return {"required_parameters": str(file.absolute())}
 
 

@@ -15,6 +15,7 @@ from uam_lab.flights.flight_options import AUTOPILOT_IMU, BUILTIN
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.node_options import EVERY_NODE
 from uam_lab.records.recording import log_facts
+from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import PX4_LOG, ResultFolder, as_json, versions
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
@@ -197,7 +198,7 @@ def _px4_parameters(settings: FlightSettings, folder: ResultFolder) -> dict[str,
         settings.vehicle, None, settings.px4_params, None if own is None else own.ranges()
     )
     file = folder.path / "logs" / REQUIRED
-    file.write_text(px4_parameters.required(values, in_the_loop(settings)), encoding="utf-8")
+    write_text(file, px4_parameters.required(values, in_the_loop(settings)))
     return {"required_parameters": str(file.absolute()), "set_parameters": own is not None}
 
 
@@ -327,7 +328,7 @@ def autopilot(
         return "", []
     if changed:
         file = folder.path / "logs" / GAINS
-        file.write_text(yaml.safe_dump(changed), encoding="utf-8")
+        write_text(file, yaml.safe_dump(changed))
         vehicle += ["--params", str(file.absolute())]
     return STAND_IN, [*instance, *patience, *vehicle, "--once"]
 

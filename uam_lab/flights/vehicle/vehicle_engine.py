@@ -6,7 +6,6 @@ The flight goes on until the mission has ended. A first request to stop in the a
 command land; a second one ends the nodes at once, and the autopilot's own failsafe acts.
 """
 
-import shutil
 import time
 from collections.abc import Collection, Iterable
 
@@ -24,6 +23,7 @@ from uam_lab.flights.ros.supervise import Course, FlightRun
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Lab
+from uam_lab.records.results.atomic import copy
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
@@ -172,7 +172,7 @@ def fly(
     """
     (folder.path / "logs").mkdir(exist_ok=True)
     if lab.file.is_file():
-        shutil.copy(lab.file, folder.path / LAB_COPY)
+        copy(lab.file, folder.path / LAB_COPY)
     with Reservation(
         None, own_autopilot=False, domain=settings.domain, namespace=settings.namespace
     ) as reservation:

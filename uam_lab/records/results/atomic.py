@@ -2,6 +2,7 @@
 
 import csv
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,6 +31,12 @@ def write_text(path: Path, text: str) -> None:
     """Write `text` (UTF-8) to `path` atomically."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def copy(source: Path, path: Path) -> None:
+    """Copy a file to `path` atomically."""
+    with replacing(path) as temporary:
+        shutil.copy(source, temporary)
 
 
 def write_rows(path: Path, head: Iterable[object], rows: Iterable[Iterable[object]]) -> None:

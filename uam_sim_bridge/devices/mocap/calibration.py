@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -142,11 +141,6 @@ def text(calibration: Calibration) -> str:
             for name, value in c.measured.items()
         ]
     return "\n".join(lines) + "\n"
-
-
-def write(calibration: Calibration, file: Path) -> None:
-    """Write the calibration file; raises OSError."""
-    file.write_text(text(calibration), encoding="utf-8")
 
 
 def fit(
