@@ -81,21 +81,23 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
 def warm_up(laws: Iterable[str]) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes,
     with the default law the compiled ticks, too."""
+    effects = presets.read([presets.LABORATORY, presets.ODOMETRY])
+    vehicle = Vehicle.load().changed({"effects": effects})
     for law in laws:
-        flight = _flight(law)
-        for _ in range(TICKS):
-            flight.tick()
+        flight = fly(law, vehicle)
         if law == catalogue.DEFAULT:
             flight.advance(TICKS, TICKS)
     _others()
 
 
-def _flight(law: str) -> DirectFlight:
+def fly(law: str, vehicle: Vehicle) -> DirectFlight:
+    """Return a flight of TICKS ticks: they have run every function of the nodes."""
     scenario = load_scenario("hover")
-    effects = presets.read([presets.LABORATORY, presets.ODOMETRY])
-    vehicle = Vehicle.load().changed({"effects": effects})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
-    return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
+    flight = DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
+    for _ in range(TICKS):
+        flight.tick()
+    return flight
 
 
 def _control() -> None:
