@@ -32,7 +32,7 @@ from uam_control.control.sample_hold import is_new
 from uam_control.control.thrust_direction import attitude_reference_step
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, YAW, X, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E, tracking_errors
-from uam_control.laws.law import LawArrays, LawInputs
+from uam_control.laws.law import LawInputs
 from uam_control.maths.compiled import borrowing, inlined
 
 # saturated: whether a limit changed the output of the last tick; flying: whether the law has begun;
@@ -70,11 +70,11 @@ def lead_force(lead: RotorLead, least: float, largest: float, dt: float, tau: np
 
 
 class ControllerArrays(NamedTuple):
-    """Of every controller: those of its law; errors (3, 6 + n), see `tracking_errors`, own: their
-    rows of the subsystem; norms (3,); tau (m,): limited output; numbers (1,): see WHOLE,
-    REAL."""
+    """Of every controller, the same for all laws. found (m,): tau of the law; errors (3, 6 + n),
+    see `tracking_errors`, own: their rows of the subsystem; norms (3,); tau (m,): limited output;
+    numbers (1,): see WHOLE, REAL."""
 
-    law: LawArrays
+    found: np.ndarray
     errors: np.ndarray
     own: tuple[np.ndarray, np.ndarray, np.ndarray]
     norms: np.ndarray
@@ -230,7 +230,7 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
     differ by the tilt.
     """
     m, tau = a.all.numbers[0], a.all.tau
-    saturated, e, found = m.saturated != 0, a.all.own[E], a.all.law.tau
+    saturated, e, found = m.saturated != 0, a.all.own[E], a.all.found
     limits = a.completion
     cut = complete_and_limit(reference, e, limits, saturated, dt, a.carried, found, tau)
     led = lead_force(a.rotors, limits.thrust_min, limits.thrust_max, dt, tau)
@@ -243,13 +243,13 @@ def end_position(a: PositionArrays, reference: np.ndarray, dt: float) -> None:
 @borrowing
 def end_attitude(a: AttitudeArrays) -> None:
     """Limit the law's torques: see `limit_torque`."""
-    a.all.numbers[0].saturated = limit_torque(a.all.law.tau, a.torque_max, a.all.tau)
+    a.all.numbers[0].saturated = limit_torque(a.all.found, a.torque_max, a.all.tau)
 
 
 @borrowing
 def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Complete the law's torques and limit them; then write goals of the servos if they are due."""
-    m, errors, tau = a.all.numbers[0], a.all.errors, a.all.law.tau
+    m, errors, tau = a.all.numbers[0], a.all.errors, a.all.found
     saturated = m.saturated != 0
     complete_effort(errors[E, ALPHA:], a.inertia, a.gain, a.limit, saturated, dt, a.integral, tau)
     if a.load.on:

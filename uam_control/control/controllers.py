@@ -89,7 +89,7 @@ class Controller:
     def _make_arrays(self) -> None:
         """Make `arrays`, and prepare the functions that use them."""
         self._own = tuple(self.errors[:, self.columns])
-        of_all = self.law.arrays, self.errors, self._own, self._norms, self._tau, self.memory
+        of_all = self.law.arrays.tau, self.errors, self._own, self._norms, self._tau, self.memory
         self.arrays = self._arrays(ControllerArrays(*of_all))
 
     def _arrays(self, of_all: ControllerArrays) -> tuple:

@@ -38,6 +38,7 @@ from uam_control.control.thrust_direction import write_thrust_attitude
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, PITCH, ROLL, YAW, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.laws.geometric import feed_back
+from uam_control.laws.law import LawArrays
 from uam_control.laws.whole_body import observe
 from uam_control.maths.compiled import jit
 from uam_control.maths.kept_tuple import bound
@@ -48,11 +49,12 @@ UP = (0.0, 0.0, 1.0)
 
 
 class WholeBodyArrays(NamedTuple):
-    """Those of the three controllers, and the vehicle, see `stiff`."""
+    """Those of the three controllers, of their laws, and the vehicle, see `stiff`."""
 
     position: PositionArrays
     attitude: AttitudeArrays
     arm: ArmArrays
+    laws: tuple[LawArrays, LawArrays, LawArrays]
     chain: Chain
 
 
@@ -69,7 +71,8 @@ class WholeBody:
     def arrays(self) -> WholeBodyArrays:
         """Those of the present parameters."""
         of = [one.arrays for one in self._controllers]
-        return WholeBodyArrays(*of, stiff(of[-1].load.chain))
+        laws = tuple(one.law.arrays for one in self._controllers)
+        return WholeBodyArrays(*of, laws, stiff(of[-1].load.chain))
 
     def _prepared(self) -> Callable:
         """Return the step, made anew where a controller's arrays are others."""
@@ -127,16 +130,17 @@ def _observe(
     a: WholeBodyArrays, d: Decoupled, velocity: Vector, state: np.ndarray, dt: float
 ) -> None:
     """Find the disturbance from what moved beyond the prediction; see `laws.whole_body`."""
-    p, q, r = a.position.all, a.attitude.all, a.arm.all
+    p, q, r = a.laws
     moved, spun = np.empty(3), np.empty(3)
     for i in range(3):
-        moved[i] = d.mass * (velocity[i] - p.law.adaptation[6 + i])
-        spun[i] = state[CHI_DOT, ROLL + i] - q.law.adaptation[6 + i]
+        moved[i] = d.mass * (velocity[i] - p.adaptation[6 + i])
+        spun[i] = state[CHI_DOT, ROLL + i] - q.adaptation[6 + i]
     count = len(r.tau)
-    bent = state[CHI_DOT, ALPHA:] - r.law.adaptation[2 * count : 3 * count] + d.coupling @ spun
-    observe(p.law.record[0], moved, p.numbers[0].frozen != 0, dt, p.law.adaptation)
-    observe(q.law.record[0], d.turning @ spun, q.numbers[0].frozen != 0, dt, q.law.adaptation)
-    observe(r.law.record[0], d.joints @ bent, r.numbers[0].frozen != 0, dt, r.law.adaptation)
+    bent = state[CHI_DOT, ALPHA:] - r.adaptation[2 * count : 3 * count] + d.coupling @ spun
+    position, attitude, arm = a.position.all, a.attitude.all, a.arm.all
+    observe(p.record[0], moved, position.numbers[0].frozen != 0, dt, p.adaptation)
+    observe(q.record[0], d.turning @ spun, attitude.numbers[0].frozen != 0, dt, q.adaptation)
+    observe(r.record[0], d.joints @ bent, arm.numbers[0].frozen != 0, dt, r.adaptation)
 
 
 @jit
@@ -150,7 +154,7 @@ def _predict(
     dt: float,
 ) -> None:
     """Predict the rates of the next tick: velocity of the centre; turns, net: see `_torques`."""
-    p, q, r = a.position.all.law, a.attitude.all.law, a.arm.all.law
+    p, q, r = a.laws
     count = len(net)
     spin = np.linalg.solve(d.turning, turns)
     bend = np.linalg.solve(d.joints, net) - d.coupling @ spin
@@ -182,7 +186,7 @@ def _force(
     """
     p, of = a.position, a.position.all
     begin_law(of, state, wanted, p.attitude, True)
-    law, m = of.law, of.numbers[0]
+    law, m = a.laws[0], of.numbers[0]
     for i in range(3):
         of.own[E][i] = now[0][i] - plan[0][i]
         of.own[E_DOT][i] = now[1][i] - plan[1][i]
@@ -238,10 +242,10 @@ def _turning(
     a: WholeBodyArrays, d: Decoupled, state: np.ndarray, wanted: np.ndarray, dt: float
 ) -> np.ndarray:
     """Return M_r (Omega_c_dot - lambda_1 e_R - lambda_2 e_Omega) - d_r (3,) [N m]."""
-    of = a.attitude.all
+    of, law = a.attitude.all, a.laws[1]
     begin_law(of, state, wanted, a.position.attitude, True)
-    feed_back(of.law.record[0], given(of, dt), of.law.tau)
-    return d.turning @ (of.law.tau / a.attitude.inertia) - of.law.adaptation[:3]
+    feed_back(law.record[0], given(of, dt), law.tau)
+    return d.turning @ (law.tau / a.attitude.inertia) - law.adaptation[:3]
 
 
 @jit
@@ -258,10 +262,10 @@ def _arm(
     y_ddot_0: what y does without that force; d_int of the base's turning is in it. J_3+ is damped.
     More joints than the task needs hold their reference in what is left, J_3+ J_3 = 0.
     """
-    of = a.arm.all
+    of, law = a.arm.all, a.laws[2]
     begin_law(of, state, wanted, a.position.attitude, True)
-    p, count, motion = of.law.record[0], len(of.tau), state.copy()
-    spin = np.linalg.solve(d.turning, turns + a.attitude.all.law.adaptation[3:6])
+    p, count, motion = law.record[0], len(of.tau), state.copy()
+    spin = np.linalg.solve(d.turning, turns + a.laws[1].adaptation[3:6])
     motion[CHI_DDOT, ROLL:ALPHA] = spin
     motion[CHI_DDOT, ALPHA:] = -(d.coupling @ spin)
     now, plan, lack = np.empty((3, TASK)), np.empty((3, TASK)), np.empty(TASK)
@@ -282,11 +286,11 @@ def _arm(
     inertia = np.linalg.inv(light)
     pull = inertia @ share.T
     damped = pull @ pull.T + p.task_damping**2 * np.eye(TASK)
-    internal = of.law.adaptation[count : 2 * count].copy()
+    internal = law.adaptation[count : 2 * count].copy()
     net = pull.T @ np.linalg.solve(damped, inertia @ lack - pull @ internal)
     if count > TASK:
-        feed_back(p, given(of, 0.0), of.law.tau)
-        posture = d.joints @ (of.law.tau / a.arm.inertia)
+        feed_back(p, given(of, 0.0), law.tau)
+        posture = d.joints @ (law.tau / a.arm.inertia)
         net += posture - pull.T @ np.linalg.solve(damped, pull @ posture)
     return net
 

@@ -390,13 +390,14 @@ def _law_step(make: Callable[[Callable], Callable], law: str) -> Callable:
 
     def step(tick: ControlTick) -> Step | None:
         stage, further = tick.laws[law], ()
-        own, inputs = type(stage.controller.law).step, tick.mission.inputs.arrays
+        own, inputs = stage.controller.law, tick.mission.inputs.arrays
         if stage is tick.attitude:
             further = tick.measured_delay.arrays
         elif stage is tick.arm:
             further = (tick.hand.arrays.reference,)
-        arrays = tick.arrays, stage.controller.arrays, stage.memory, inputs, *further
-        return Step(make(own), arrays) if counts_references(own) else None
+        arrays = tick.arrays, stage.controller.arrays, own.arrays, stage.memory, inputs, *further
+        compute = type(own).step
+        return Step(make(compute), arrays) if counts_references(compute) else None
 
     return step
 

@@ -122,16 +122,16 @@ def position_step(law: Callable) -> Callable[[tuple], int]:
 
     @borrowing
     def control(a: tuple) -> int:
-        s, p, stage, inputs = a
+        s, p, own, stage, inputs = a
         if not p.all.numbers[0].flying:
             return DECIDE
         dt = step_to(stage, s.numbers[0].stamp)
         begin_law(p.all, s.state, s.reference, p.attitude, True)
-        law(p.all.law.record, given(p.all, dt), p.all.law.adaptation, p.all.law.tau)
+        law(own.record, given(p.all, dt), own.adaptation, own.tau)
         end_position(p, s.reference, dt)
         for row in range(3):
             put(p.attitude[row], s.attitude_reference[row])
-        keep_gains(stage, inputs, POSITION, s.numbers[0].stamp, p.all.law.adaptation)
+        keep_gains(stage, inputs, POSITION, s.numbers[0].stamp, own.adaptation)
         return DONE
 
     return control
@@ -143,16 +143,16 @@ def attitude_step(law: Callable) -> Callable[[tuple], int]:
 
     @borrowing
     def control(a: tuple) -> int:
-        s, q, stage, inputs, delay, reports, prediction = a
+        s, q, own, stage, inputs, delay, reports, prediction = a
         if not q.all.numbers[0].flying:
             return DECIDE
         stamp = s.numbers[0].stamp
         apply_reports(delay, reports, prediction, stamp)
         dt = step_to(stage, stamp)
         begin_attitude(q, s.state, s.reference, s.attitude_reference, dt)
-        law(q.all.law.record, given(q.all, dt), q.all.law.adaptation, q.all.law.tau)
+        law(own.record, given(q.all, dt), own.adaptation, own.tau)
         end_attitude(q)
-        keep_gains(stage, inputs, ATTITUDE, stamp, q.all.law.adaptation)
+        keep_gains(stage, inputs, ATTITUDE, stamp, own.adaptation)
         return DONE
 
     return control
@@ -164,13 +164,13 @@ def arm_step(law: Callable) -> Callable[[tuple], int]:
 
     @borrowing
     def control(a: tuple) -> int:
-        s, r, stage, inputs, reference = a
+        s, r, own, stage, inputs, reference = a
         dt = step_to(stage, s.numbers[0].stamp)
         begin_law(r.all, s.state, reference, s.attitude_reference, True)
         let_go(r, s.state, reference)
-        law(r.all.law.record, given(r.all, dt), r.all.law.adaptation, r.all.law.tau)
+        law(own.record, given(r.all, dt), own.adaptation, own.tau)
         end_arm(r, s.state, reference, dt)
-        keep_gains(stage, inputs, ARM, s.numbers[0].stamp, r.all.law.adaptation)
+        keep_gains(stage, inputs, ARM, s.numbers[0].stamp, own.adaptation)
         return DONE
 
     return control
@@ -222,8 +222,8 @@ def whole_body_step(law: Callable) -> Callable[[tuple], int]:
     @borrowing
     def control(a: tuple) -> int:
         s, (w, stages), inputs = a
-        p, q, r = w.position.all, w.attitude.all, w.arm.all
-        if not (p.numbers[0].flying and q.numbers[0].flying):
+        flying, (p, q, r) = w.position.all.numbers[0].flying, w.laws
+        if not (flying and w.attitude.all.numbers[0].flying):
             return DECIDE
         stamp = s.numbers[0].stamp
         dt = step_to(stages[POSITION], stamp)
@@ -232,9 +232,9 @@ def whole_body_step(law: Callable) -> Callable[[tuple], int]:
         law(w, s.state, s.reference, dt)
         for row in range(3):
             put(w.position.attitude[row], s.attitude_reference[row])
-        keep_gains(stages[POSITION], inputs, POSITION, stamp, p.law.adaptation)
-        keep_gains(stages[ATTITUDE], inputs, ATTITUDE, stamp, q.law.adaptation)
-        keep_gains(stages[ARM], inputs, ARM, stamp, r.law.adaptation)
+        keep_gains(stages[POSITION], inputs, POSITION, stamp, p.adaptation)
+        keep_gains(stages[ATTITUDE], inputs, ATTITUDE, stamp, q.adaptation)
+        keep_gains(stages[ARM], inputs, ARM, stamp, r.adaptation)
         return DONE
 
     return control
