@@ -34,7 +34,7 @@ class Notes(Observer):
 
 def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
     notes = Notes()
-    given = {"scenario": "hover", "out": tmp_path / "out", "without": ["scene"]}
+    given = {"scenario": "hover", "out": tmp_path / "out", "without": ["scene"], "fused": True}
     given["remappings"] = {"uam/state": "estimate", "imu/data": "imu", "uam/mission/status": "told"}
     limit = {"mission": {"takeoff_delay": 1.0}}
     with Flight(auto_start=False, parameters=limit, observer=notes, **given) as flight:
@@ -101,8 +101,8 @@ def test_a_block_that_is_left_stops_its_flight(long_scenario, tmp_path):
 
 def test_a_failure_is_an_exception_with_its_reason(short_scenario, tmp_path, monkeypatch):
     monkeypatch.setattr(node_arguments, "START_TIMEOUT", 0.5)
-    flight = Flight(scenario=short_scenario, out=tmp_path)
-    apart = {"position_controller": {"uam/state": "nowhere"}}  # it never gets its input
+    flight = Flight(scenario=short_scenario, out=tmp_path, fused=True)
+    apart = {"mujoco_sim": {"imu/data": "nowhere"}}  # the control never gets its input
     flight.settings = replace(flight.settings, remappings=apart)
     with pytest.raises(FlightFailed, match="no progress for 0.5 s") as failed, flight:
         flight.wait()

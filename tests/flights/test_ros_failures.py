@@ -117,7 +117,7 @@ def test_a_node_that_stops_for_a_while_changes_nothing(fly, short_scenario, shar
 
 
 def test_ctrl_c_keeps_what_was_flown(fly, long_scenario):
-    flight = fly("--scenario", str(long_scenario), report=True)
+    flight = fly("--fused", "--scenario", str(long_scenario), report=True)
     flight.until_phase("hover")
     nodes = flight.children()
     flight.process.send_signal(signal.SIGINT)
