@@ -14,9 +14,9 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.polynomials import Polynomials
 
 PLACES = 20  # on the way to rest, for the check of the geofence
-DERIVATIVES = 5  # value, rate, acceleration, jerk, snap
 SHORTEST = 0.3  # [s] of a fade, and of the stop of a sinking vehicle near the ground
 MOST_ACROSS, MOST_UP = 7.0, 3.0  # [m/s^2] largest acceleration at the start: 35 deg of tilt, 0.3 g
 ACROSS = slice(X, Z)
@@ -57,41 +57,19 @@ class Stop:
         first = [zero, -gained * fade, a / 2, j / 6, *faded]
         v = (rate + gained) * brake
         second = [value, v, zero, zero, zero, -7.0 * v, 14.0 * v, -10.0 * v, 2.5 * v]
-        self._parts = (_Polynomial(first, fade), _Polynomial(second, brake))
+        ends = (first, fade), (second, brake)
+        self._parts = [Polynomials([0.0, end], np.array([powers])) for powers, end in ends]
         self.length = brake
 
     def at(self, time: float) -> np.ndarray:
         """Return value, rate, acceleration, jerk and snap (5, k) at `time` [s] from the start."""
-        return sum(part.at(time) for part in self._parts)
+        if time <= 0.0:
+            return sum(part.ends()[0] for part in self._parts)
+        return sum(part.rows([time])[:, 0] for part in self._parts)
 
     def values(self, times: np.ndarray) -> np.ndarray:
         """Return the values (m, k) at times (m,) [s] from the start."""
-        return sum(part.values(times) for part in self._parts)
-
-
-class _Polynomial:
-    """A polynomial of time / length with its derivatives; constant after its length."""
-
-    def __init__(self, coefficients: list[np.ndarray], length: float) -> None:
-        """coefficients: (k,) each, constant first; length [s]."""
-        c, self._length = np.array(coefficients), length
-        self._orders = []
-        for order in range(DERIVATIVES):
-            self._orders.append(c / length**order)
-            c = c[1:] * np.arange(1.0, len(c))[:, None]
-
-    def at(self, time: float) -> np.ndarray:
-        """Return the derivatives (5, k) at `time` [s]."""
-        u = min(max(time / self._length, 0.0), 1.0)
-        values = np.array([u ** np.arange(len(c)) @ c for c in self._orders])
-        if time >= self._length:
-            values[CHI_DOT:] = 0.0
-        return values
-
-    def values(self, times: np.ndarray) -> np.ndarray:
-        """Return the values (m, k) at times (m,) [s]."""
-        u = np.clip(times / self._length, 0.0, 1.0)
-        return u[:, None] ** np.arange(len(self._orders[0])) @ self._orders[0]
+        return sum(part.rows(times, 1)[CHI] for part in self._parts)
 
 
 class Braking:
