@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from uam_control.profiles.profile import default_profile, load_profile, profile_of
-from uam_control.profiles.profile_fit import misfits
 from uam_control.vehicle import chain_of, load_description
 from uam_lab.flights import flight_settings
 from uam_lab.flights.flight_settings import settings
@@ -16,7 +15,7 @@ S500 = load_description()
 
 @pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
 def test_the_vehicles_here_have_profiles_that_fit(name):
-    assert not misfits(default_profile("modular", load_description(name)))
+    assert not default_profile("modular", load_description(name)).misfits
 
 
 @pytest.mark.parametrize(
@@ -34,7 +33,7 @@ def test_a_profile_of_another_vehicle_is_named(mass, full, expected):
         S500.rotor, thrust_coefficient=full / len(S500.rotors) / S500.rotor.speed_max**2
     )
     vehicle = replace(S500, mass=mass, rotor=rotor)
-    text = "; ".join(misfits(load_profile("s500", vehicle=vehicle)))
+    text = "; ".join(load_profile("s500", vehicle=vehicle).misfits)
     whole = f"profile s500 does not fit s500_arm: position_controller has {expected}"
     assert text == (whole if expected else "")
 
@@ -42,7 +41,7 @@ def test_a_profile_of_another_vehicle_is_named(mass, full, expected):
 def test_a_bandwidth_that_the_rate_of_the_poses_caps_is_named():
     profile = default_profile("modular")
     sections = profile.sections | {"state_estimator": {"position_bandwidth": 45.0}}
-    (text,) = misfits(profile_of(sections, profile.file))  # 120 poses per second: 0.3 * 120
+    (text,) = profile_of(sections, profile.file).misfits  # 120 poses per second: 0.3 * 120
     assert text.endswith("position_bandwidth 45 rad/s acts as 36: a pose comes every 8.33 ms")
 
 

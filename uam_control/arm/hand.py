@@ -7,6 +7,7 @@ are lost only where the tool's y axis stands upright.
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -165,11 +166,16 @@ def least_change(slopes: np.ndarray, off: np.ndarray) -> np.ndarray:
     return (slopes.swapaxes(1, 2) @ solved)[:, :, 0]
 
 
+def _slopes(chain: Chain, angles: np.ndarray) -> np.ndarray:
+    """Return the velocity (3, n) [m/rad] of the hand per joint rate, for a level base."""
+    jacobian = np.empty((6, len(angles)))
+    hand_jacobian(chain, np.asarray(angles, dtype=float), DOWN, jacobian)
+    return jacobian[POSITION]
+
+
 def stretch(chain: Chain, angles: np.ndarray) -> np.ndarray:
     """Return the singular values [m/rad], largest first, of the hand's velocity in the base."""
-    jacobian = np.empty((6, len(angles)))
-    hand_jacobian(chain, np.asarray(angles, dtype=float), (0.0, 0.0, -1.0), jacobian)
-    return np.linalg.svd(jacobian[POSITION], compute_uv=False)
+    return np.linalg.svd(_slopes(chain, angles), compute_uv=False)
 
 
 def freedom(chain: Chain) -> int:
@@ -201,12 +207,8 @@ def angles_for(
     def miss(angles: np.ndarray) -> np.ndarray:
         return np.array(hand_pose(chain, angles, DOWN)[0]) - position
 
-    def slopes(angles: np.ndarray) -> np.ndarray:
-        jacobian = np.empty((6, len(angles)))
-        hand_jacobian(chain, angles, DOWN, jacobian)
-        return jacobian[:3]
-
     best, least = 0.5 * (low + high), np.inf
+    slopes = partial(_slopes, chain)
     shares = np.random.default_rng(0).uniform(INSIDE, 1.0 - INSIDE, (STARTS, len(low)))
     for start in low + shares * (high - low):
         found = least_squares(miss, start, slopes, (low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14)

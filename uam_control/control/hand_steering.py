@@ -34,9 +34,8 @@ from uam_control.settings.parameter_set import ParameterSet, number
 FADE = 0.5  # [s] in which the correction comes and goes
 RETURN = 4.0  # [rad/s] bandwidth of the way back to the reference, without a bandwidth of its own
 INSIDE = 0.1  # [rad] of the end of a joint's range; the supervisor holds up to 0.05 before it
-# freedom: directions in which the hand moves; why: see FADES
+# freedom: directions in which the hand moves; why: see FADES. REAL: parameters, weight, period [s]
 WHOLE = "has_hand freedom why"
-REAL = "bandwidth damping rate_max error_max singular weight period"
 # why the correction fades out, as text
 FADES = STEERS, IDLE, SINGULAR, FAR = range(4)
 TEXTS = {
@@ -74,6 +73,9 @@ class HandParameters(ParameterSet):
     )  # fmt: skip
 
 
+REAL = " ".join((*HandParameters.specs(), "weight", "period"))
+
+
 class HandArrays(NamedTuple):
     """chain: of the arm; ranges (2, n) [rad]; correction (2, n): angles [rad] and rates; pose
     (6 + n,), jacobian (6, n): for the computation; reference (3, 6 + n): of the arm law; numbers
@@ -100,22 +102,24 @@ def steer(
     m, count = h.numbers[0], h.correction.shape[1]
     dt = m.period
     h.reference[:] = reference
-    if m.has_hand == 0 or (m.bandwidth == 0.0 and m.weight == 0.0 and not h.correction[0].any()):
+    if m.has_hand == 0 or (
+        m.hand_bandwidth == 0.0 and m.weight == 0.0 and not h.correction[0].any()
+    ):
         return
     error, away = _error(h, state, reference)
     square = squared(h.jacobian)
     m.why = _why(h, flying, away, square)
-    wanted = m.bandwidth > 0.0 and m.why == STEERS
+    wanted = m.hand_bandwidth > 0.0 and m.why == STEERS
     m.weight = min(1.0, m.weight + dt / FADE) if wanted else max(0.0, m.weight - dt / FADE)
-    if m.weight > 0.0 and away <= m.error_max:
-        goal = _least(h, error, square, m.damping)
+    if m.weight > 0.0 and away <= m.hand_error_max:
+        goal = _least(h, error, square, m.hand_damping)
     else:
         goal = (0.0, 0.0, 0.0)
-    bandwidth = m.bandwidth if wanted else max(m.bandwidth, RETURN)
+    bandwidth = m.hand_bandwidth if wanted else max(m.hand_bandwidth, RETURN)
     for i in range(count):
         target = m.weight * dot(vector(h.jacobian[:3, i]), goal)
         now, angle = h.correction[0, i], reference[CHI, ALPHA + i]
-        rate = min(m.rate_max, max(-m.rate_max, bandwidth * (target - now)))
+        rate = min(m.hand_joint_rate, max(-m.hand_joint_rate, bandwidth * (target - now)))
         # a reference that is near the end of its range stays there
         low, high = min(0.0, h.ranges[0, i] - angle), max(0.0, h.ranges[1, i] - angle)
         after = min(high, max(low, now + rate * dt))
@@ -135,9 +139,9 @@ def _why(h: HandArrays, flying: bool, away: float, square: np.ndarray) -> int:
     m = h.numbers[0]
     if not flying:
         return IDLE
-    if away > m.error_max:
+    if away > m.hand_error_max:
         return FAR
-    return SINGULAR if hardest(square, m.freedom) < m.singular else STEERS
+    return SINGULAR if hardest(square, m.freedom) < m.hand_singular else STEERS
 
 
 @jit

@@ -27,6 +27,7 @@ from uam_control.estimation.waiting import OLDEST_MATCH, drop_first, insert, val
 from uam_control.maths.compiled import jit
 from uam_control.maths.memory import record
 from uam_control.maths.rotations import (
+    CONJUGATE,
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
     quaternion_multiply,
@@ -42,7 +43,6 @@ FIRST = 0.05  # s, interval that the first correction counts for
 LARGEST_GAIN = 0.3
 LATE_SHARE = 0.2  # of a pose's lateness counts as such an interval: biases since then are not seen
 TURN, POSE = 3, 7  # a stored pose: position before, quaternion from this index on; its numbers
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class EstimatedMotion(NamedTuple):

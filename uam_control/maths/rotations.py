@@ -11,6 +11,8 @@ import numpy as np
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.vectors import Rows
 
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # times a unit quaternion: its inverse
+
 
 @borrowing
 def rows_from_euler(roll: float, pitch: float, yaw: float) -> Rows:
@@ -167,12 +169,7 @@ def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
     Both are unit quaternions (4,) [w x y z]. The length is 2 sin(angle/2): equal to the angle for
     small angles, and monotone up to pi.
     """
-    inverse = np.empty(4)
-    inverse[0] = actual[0]
-    inverse[1] = -actual[1]
-    inverse[2] = -actual[2]
-    inverse[3] = -actual[3]
-    difference = quaternion_multiply(inverse, reference)
+    difference = quaternion_multiply(CONJUGATE * actual, reference)
     sign = 2.0 if difference[0] >= 0.0 else -2.0
     return sign * difference[1:4]
 

@@ -174,10 +174,7 @@ def _turns(
     for i in range(len(angles)):
         roll, pitch, one = angles[i, 0], angles[i, 1], turning[i]
         rates[i, 0], rates[i, 1], rates[i, 2] = body_rates(roll, pitch, one[0], one[1], one[2])
-        matrix = matrix_from_euler(angles[i])
-        for j in range(3):
-            for k in range(3):
-                rotations[i, j, k] = matrix[j, k]
+        rotations[i] = matrix_from_euler(angles[i])
 
 
 @jit

@@ -126,7 +126,7 @@ class Feasibility:
         """
         p = self.limits
         ground = demand.position[0, Z] if ground is None else ground
-        low, high = self._room(ground)
+        low, high = self.limits.room(ground)
         place, upper = demand.position.T, [*self._motion(demand), *self._loads(demand)]
         lowest, highest = p.joint_ranges
         angles = [(f"joint {i + 1} angle", one) for i, one in enumerate(demand.angles.T)]
@@ -153,12 +153,6 @@ class Feasibility:
                     excess = Excess(quantity, float(values[worst]), float(limit), unit, *at, origin)
                     found.append(excess)
         return sorted(found, key=lambda excess: excess.first)
-
-    def _room(self, ground: float) -> np.ndarray:
-        """Return the corners (2, 3) [m] of the space above a take-off at height `ground` [m]."""
-        low, high = np.array(self.limits.geofence_low), np.array(self.limits.geofence_high)
-        high[Z] = min(high[Z], ground + self.limits.altitude_hold)
-        return np.stack([low, high])
 
     def _motion(self, demand: Demand) -> list[tuple[str, np.ndarray, float, str]]:
         """Return quantity, values (m,), limit and unit of the base's motion."""
@@ -250,7 +244,7 @@ class Feasibility:
     def _ramp(self, goal: np.ndarray) -> Polynomials | None:
         """Return the shortest run-up to goal (5, 6 + n) that leaves a reserve, else the one that
         needs least, None if each exceeds a limit."""
-        room = self._room(STANDING)
+        room = self.limits.room(STANDING)
         room[0, Z] = max(room[0, Z], STANDING + self.limits.touchdown_height)
         room += np.array([[CLEAR], [-CLEAR]])
         begin = goal[CHI, POSITION]

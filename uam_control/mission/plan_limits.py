@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW
+from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.plans import BASE, Plan, PlanRefused
 
@@ -11,10 +11,9 @@ ROUNDING = 1e-9  # [m or rad]
 
 def room(p: MissionParameters, ground: float) -> np.ndarray:
     """Return the corners (2, 3) [m] of the base's room; ground [m]: height at take-off."""
-    low, high = np.array(p.geofence_low), np.array(p.geofence_high)
-    low[2] = max(low[2], ground + p.airborne_height)
-    high[2] = min(high[2], ground + p.altitude_hold)
-    return np.stack([low, high])
+    found = p.room(ground)
+    found[0, Z] = max(found[0, Z], ground + p.airborne_height)
+    return found
 
 
 def check(plan: Plan, p: MissionParameters, ground: float) -> None:

@@ -108,10 +108,7 @@ class MissionInputs:
 
     def _on_temperature(self, message: Temperature) -> None:
         joint = message.header.frame_id
-        if joint == GRIPPER:
-            self._inputs.temperature(joint, message.temperature)
-            return
-        if joint not in self._names:
+        if joint not in (*self._names, GRIPPER):
             raise BadMessage(f"frame_id {joint!r} is no joint; there are: {', '.join(self._names)}")
         self._inputs.temperature(joint, message.temperature)
 

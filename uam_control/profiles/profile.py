@@ -42,6 +42,7 @@ ESTIMATOR, MISSION = "state_estimator", "mission"
 NODES = (*CONTROLLERS, ESTIMATOR, MISSION)
 BRIDGE = "mavlink_bridge"
 READ = (*NODES, BRIDGE)  # nodes of a profile; a file may have sections of others
+TOLERATED = 0.3  # relative error of an inertia that the adaptive laws take (docs/your_vehicle.md)
 LIKE = 0.85  # likeness of a name that means one of them
 # shares that a reference may need: of the bridge's largest body rates; of the acceleration that the
 # attitude law's largest torque gives
@@ -106,6 +107,31 @@ class Profile:
     def whole(self) -> bool:
         """Whether the controllers have a law of the whole body."""
         return all(catalogue.law(law).whole for law in self.laws().values())
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        """Lines about numbers that are probably of another vehicle; none if they fit: the position
+        controller's inertia and thrust, and the estimator's bandwidths beside the rate of the
+        vehicle's motion capture."""
+        vehicle, parameters = self.vehicle, self.sets["position_controller"]
+        found = []
+        for axis, inertia in zip("xyz", getattr(parameters, "inertia", ()), strict=False):
+            if abs(inertia - vehicle.mass) > TOLERATED * vehicle.mass:
+                found.append(
+                    f"inertia {inertia:g} kg along {axis}, the vehicle has {vehicle.mass:g} kg"
+                )
+                break
+        if parameters.thrust_max > vehicle.full_thrust:
+            full = f"the rotors' full thrust is {vehicle.full_thrust:.3g} N"
+            found.append(f"thrust_max {parameters.thrust_max:g} N, {full}")
+        interval = 1.0 / vehicle.numbers["sensors"]["mocap"]["rate"]
+        wide = self.sets["state_estimator"].capped(interval)
+        text = f"profile {self.name} does not fit {vehicle.name}"
+        return tuple(
+            f"{text}: {node} {'; '.join(lines)}"
+            for node, lines in (("position_controller has", found), ("state_estimator:", wide))
+            if lines
+        )
 
     def changed(self, name: str, changes: Mapping[str, Mapping[str, Any]]) -> Self:
         """Return the profile `name` with other parameters, node → parameter → value.

@@ -49,16 +49,12 @@ class HandStage:
     def steers(self) -> bool:
         """Whether the arm stabilises a hand in flight."""
         numbers = self.arrays.numbers[0]
-        return bool(numbers.has_hand != 0 and numbers.bandwidth > 0.0)
+        return bool(numbers.has_hand != 0 and numbers.hand_bandwidth > 0.0)
 
     def configure(self, parameters: HandParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
-        numbers = self.arrays.numbers
-        numbers["bandwidth"] = parameters.hand_bandwidth
-        numbers["damping"] = parameters.hand_damping
-        numbers["rate_max"] = parameters.hand_joint_rate
-        numbers["error_max"] = parameters.hand_error_max
-        numbers["singular"] = parameters.hand_singular
+        for name in HandParameters.specs():
+            self.arrays.numbers[name] = getattr(parameters, name)
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, saturated: bool
@@ -71,7 +67,7 @@ class HandStage:
     def fades(self) -> str:
         """Why the correction fades out, "" while it acts, or if there is none."""
         one = self.arrays.numbers[0]
-        return TEXTS[int(one["why"])] if one["has_hand"] and one["bandwidth"] else ""
+        return TEXTS[int(one["why"])] if one["has_hand"] and one["hand_bandwidth"] else ""
 
 
 def _arm(vehicle: VehicleDescription | None) -> tuple[Chain, np.ndarray]:

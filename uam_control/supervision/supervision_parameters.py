@@ -222,3 +222,9 @@ class SupervisionParameters(Reactions, SupervisionLimits):
     def joint_ranges(self) -> np.ndarray:
         """Lowest and highest angle (2, n) [rad] of each joint that start no hold."""
         return np.multiply.outer((-1.0, 1.0), self.joint_angle_hold) + self.joint_angle_middle
+
+    def room(self, ground: float) -> np.ndarray:
+        """Return the corners (2, 3) [m] of the space above a take-off at height `ground` [m]."""
+        found = np.array([self.geofence_low, self.geofence_high])
+        found[1, 2] = min(found[1, 2], ground + self.altitude_hold)
+        return found

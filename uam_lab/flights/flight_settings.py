@@ -10,7 +10,6 @@ from typing import Any
 from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import Profile, complete_profile, default_profile, load_profile
-from uam_control.profiles.profile_fit import misfits
 from uam_control.setpoints.setpoint_types import WRENCH
 from uam_control.settings import configuration
 from uam_control.settings.process_parameters import ProcessParameters
@@ -159,7 +158,7 @@ def settings(scenario: str | Path | None = None, **given: Any) -> FlightSettings
         scenario_source=str(o.scenario),
         scenario_options=scenario_options,
         notes=scenario.notes
-        + misfits(profile)
+        + profile.misfits
         + node_options.unread(profile)
         + _about_the_arm(vehicle, scenario, mass)
         + ((about,) if about else ())
