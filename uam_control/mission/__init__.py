@@ -2,7 +2,6 @@
 
 from uam_control.mission.feasibility import Feasibility, InfeasibleReference
 from uam_control.mission.mission import Mission
-from uam_control.mission.mission_output import MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.pre_arm import ChecklistReport
 from uam_control.mission.scenarios.scenario import Scenario, ScenarioError

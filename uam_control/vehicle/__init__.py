@@ -9,12 +9,10 @@ from uam_control.vehicle.description import (
     POSITION_SERVO,
     SERVO_MODES,
     Joint,
-    Rotor,
-    RotorModel,
     Servo,
     VehicleDescription,
 )
-from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER, Gripper, OpenEnd, closes
+from uam_control.vehicle.gripper import NO_GRIPPER, TWO_FINGER, OpenEnd, closes
 from uam_control.vehicle.loading import (
     AUTOPILOT_FILE,
     DEFAULT_VEHICLE,

@@ -193,10 +193,7 @@ class Scenario:
 
     def magnet_on(self, time: float) -> bool:
         """Return the desired state of the magnet at mission time `time` [s]."""
-        for at, on in reversed(self.magnet):
-            if time >= at:
-                return on
-        return False
+        return next((on for at, on in reversed(self.magnet) if time >= at), False)
 
 
 class Added:
