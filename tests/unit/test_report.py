@@ -265,6 +265,21 @@ def test_a_missing_info_is_no_error_and_a_damaged_file_is_one_line(
         assert capsys.readouterr().err == f"uam report: {file}: {complaint}\n"
 
 
+def test_the_report_of_a_flight_without_a_log_in_another_folder(
+    flight_folder, tmp_path, monkeypatch, capsys
+):
+    """As of the direct engine. The flight's folder stays as it is; another flight's is refused."""
+    for name in list(figures.FIGURES)[2:]:
+        monkeypatch.delitem(figures.FIGURES, name)
+    before, again = sorted(flight_folder.iterdir()), tmp_path / "again"
+    command = ["report", str(flight_folder), "--no-pictures", "--out"]
+    assert main([*command, str(again)]) == 0
+    assert (again / "report.html").exists() and (again / "metrics.json").exists()
+    assert sorted(flight_folder.iterdir()) == before
+    assert main([*command, str(again)]) == 2
+    assert str(again) in capsys.readouterr().err
+
+
 def test_the_log_stands_for_its_folder(tmp_path, capsys):
     assert main(["report", str(tmp_path / "log.mcap")]) == 2
     assert capsys.readouterr().err == f"uam report: {tmp_path} has no log.mcap for a report\n"

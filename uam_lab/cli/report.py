@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 def one(options: argparse.Namespace) -> int:
     """Rebuild the report of one flight; return the exit status."""
-    from uam_lab.records.rebuild import rebuild
+    from uam_lab.records.rebuild import copy_flight, rebuild
     from uam_lab.report.build import build_report
     from uam_lab.report.page.console import reporting, summary
 
@@ -55,10 +55,12 @@ def one(options: argparse.Namespace) -> int:
     if (directory / LOG).exists():
         require_ros()
         metrics = rebuild(directory, out, options.scenario)
-    elif options.out is None and (directory / "metrics.json").exists():  # of the direct engine
+    elif (directory / "metrics.json").exists():  # of the direct engine
         metrics = read_json(directory / "metrics.json")
         if missing := [name for name in SHOWN if name not in metrics]:
             raise ResultFolderError(f"{directory / 'metrics.json'}: {missing[0]} is missing")
+        if out.resolve() != directory.resolve():
+            copy_flight(directory, out)
     else:
         raise ResultFolderError(f"{directory} has no {LOG} for a report")
     console = Terminal()

@@ -1,5 +1,6 @@
 """Rebuild a result folder from its log alone: table, metrics, facts."""
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,18 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     for name in FILES:
         _take_over(name, directory, out, facts.texts)
     return complete(folder, known, outcome)
+
+
+def copy_flight(directory: Path, out: Path) -> None:
+    """Copy what a flight without a log has left in `directory` to the folder `out`.
+
+    Raises ResultFolderError if `out` contains a flight; OSError.
+    """
+    ResultFolder(out).refuse_flight()
+    out.mkdir(parents=True, exist_ok=True)
+    for name in (TABLE, "metrics.json", "info.json", *FILES):
+        if (directory / name).exists():
+            shutil.copyfile(directory / name, out / name)
 
 
 def series_of(directory: Path) -> timeseries.Series:
