@@ -47,8 +47,8 @@ def add(command: Command) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    from uam_lab.experiments.margins import gains, report
-    from uam_lab.experiments.margins.cases import cases_of, smallest_delay
+    from uam_lab.experiments.margins import report
+    from uam_lab.experiments.margins.cases import cases_of, flown_gains, smallest_delay
     from uam_lab.experiments.margins.pose_delay import pose_delay
     from uam_lab.experiments.margins.stack_model import MODELLED
     from uam_lab.experiments.trials.trial import Trial, recorded
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         if series is None:
             mass = load_scenario(options.scenario, described).payload_mass
             series = recorded(Trial("margins", profile, mass, 1, options.scenario)).series
-        flown = gains.flown_gains(profile, series)
+        flown = flown_gains(profile, series)
     ticks = round(1e-3 * options.delay / described.control_period)
     cases = cases_of(profile, vehicle, payloads, flown, options.arm, ticks)
     mocap = described.numbers["sensors"]["mocap"]

@@ -3,7 +3,6 @@
 import itertools
 import math
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Self
 
 import mujoco
@@ -151,8 +150,3 @@ def noise_gains(rate: float, cutoffs: list[float]) -> np.ndarray:
             rate_torque(still, 1.0 / rate, filters, gains, True, memory)
             answers[which, k] = memory[TORQUE]
     return np.einsum("aki,bki->iab", answers, answers)
-
-
-def payload(described: VehicleDescription, criteria: SimpleNamespace) -> float:
-    """Return the payload [kg] with which the margins are kept."""
-    return criteria.payload * described.mass

@@ -20,7 +20,7 @@ from uam_control.estimation import EstimatorParameters
 from uam_control.profiles.profile import Profile, ProfileError, profile_of
 from uam_control.vehicle import VehicleDescription, chain_of
 from uam_lab.experiments.design.criteria import DesignError
-from uam_lab.experiments.design.facts import Facts, payload, standing_torque
+from uam_lab.experiments.design.facts import Facts, standing_torque
 from uam_lab.experiments.design.gains import (
     Bandwidths,
     autopilot_gains,
@@ -119,7 +119,7 @@ class Search:
         names = described.coordinates
         self._shares = dict.fromkeys((RATES, *names), 1.0)
         self._limits: dict[str, str] = {}
-        poses, mass = self.facts.poses, payload(described, criteria)
+        poses, mass = self.facts.poses, criteria.payload * described.mass
         loaded = (f"stowed, {mass:.2g} kg", poses["stowed"], mass)
         # label, joint angles and payload [kg] of each operating point
         self._points = [*((name, arm, 0.0) for name, arm in poses.items()), loaded]

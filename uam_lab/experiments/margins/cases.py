@@ -9,16 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.laws import catalogue
 from uam_control.laws.modular import ZETA
 from uam_control.profiles.profile import Profile
 from uam_control.vehicle import CURRENT_SERVO
 from uam_lab.experiments.margins.loops import Analysis, GrowingMode, analyse, fastest_mode
 from uam_lab.experiments.margins.stack_model import MODELLED, Stack, stack_model
-from uam_lab.records.results.timeseries import SUBSYSTEMS
+from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 INITIAL, FLOWN = "initial gains", "flown gains"
 TOLERANCE = 1.05  # ratio of the profile's delay_margin to that of the vehicle
+PERCENTILE = 95.0  # of an adapted gain along a flight
 LEAST_GAIN, MOST_PEAK = 3.0, 4.0  # [dB]; largest sensitivity
 
 
@@ -116,3 +118,28 @@ def _missed(case: Case, stated: float) -> list[str]:
             gain = min(one.gain, one.gain_down)
             lines.append(f"{loop}: gain margin {gain:.1f} dB, sensitivity {one.peak:.1f}")
     return lines
+
+
+def flown_gains(profile: Profile, series: Series) -> dict[str, np.ndarray]:
+    """Return the gains of each subsystem in a flight, for the model.
+
+    The modular law has the gain rho / max(||r||, varpi) on r, the model rho / varpi: its rho is the
+    95th percentile of rho varpi / max(||r||, varpi) in flight. K0 alone gives it, because the other
+    terms depend on the motion. Of the other laws each gain is the median.
+    """
+    found = {}
+    for subsystem in SUBSYSTEMS:
+        parameters = profile.sets[f"{subsystem}_controller"]
+        names = catalogue.law(parameters.law).gain_names(len(parameters.inertia))
+        rows = series.values[series.flown][:, gain_columns(subsystem, names, series.columns)]
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if not len(rows):
+            continue
+        if parameters.law != catalogue.DEFAULT:
+            found[subsystem] = np.median(rows, axis=0)
+            continue
+        zeta = float(np.median(rows[:, ZETA]))
+        layer = np.maximum(rows[:, names.index("r_norm")] / parameters.varpi, 1.0)
+        rho = float(np.percentile(rows[:, names.index("rho")] / layer, PERCENTILE))
+        found[subsystem] = np.array([max(rho - zeta, 0.0), 0.0, 0.0, 0.0, zeta])
+    return found

@@ -51,7 +51,7 @@ def describe(status: int | None) -> str:
     return f"ended by itself with exit status {status}"
 
 
-def tail(log: Path, count: int = LAST_LINES) -> list[str]:
+def tail(log: Path) -> list[str]:
     """Return the last non-empty lines of a text file; none if it does not exist."""
     try:
         with log.open("rb") as file:
@@ -59,7 +59,7 @@ def tail(log: Path, count: int = LAST_LINES) -> list[str]:
             text = file.read().decode(errors="replace")
     except OSError:
         return []
-    return [line for line in text.splitlines() if line.strip()][-count:]
+    return [line for line in text.splitlines() if line.strip()][-LAST_LINES:]
 
 
 def _is_stopped(pid: int) -> bool:

@@ -23,14 +23,11 @@ class Starter(threading.Thread):
     `waits_for`: what it waits for now, one line.
     """
 
-    def __init__(
-        self, guest: Callable[[str], Guest], checklist: bool, patience: float = PATIENCE
-    ) -> None:
+    def __init__(self, guest: Callable[[str], Guest], checklist: bool) -> None:
         """guest: returns a node in the flight's ROS domain, by its name; checklist: wait for the
-        lists; patience [s]: without progress."""
+        lists."""
         super().__init__(name="starter", daemon=True)
         self._guest, self._required = guest, checklist
-        self._patience = patience
         self._ended = threading.Event()
         self.started, self.refused, self.waits_for = False, "", "the nodes"
 
@@ -56,7 +53,7 @@ class Starter(threading.Thread):
                     count = sum(item.result == PASSED for item in items)
                     if count > most:  # not those that come and go
                         most, progress = count, now
-                if now - progress > self._patience:
+                if now - progress > PATIENCE:
                     self.refused = self.waits_for
                     return
                 if passed and now - asked >= AGAIN:

@@ -200,7 +200,7 @@ def _time(duration: Duration) -> dict[str, int]:
     return {"sec": seconds, "nsec": rest} if duration.nanoseconds else dict(INFINITE)
 
 
-def new_log_file(stamp: str, parent: Path = Path()) -> Path:
-    """Return `log-<stamp>/log-<stamp>.mcap` in `parent`: a bag of ROS 2 is a folder."""
+def new_log_file(stamp: str) -> Path:
+    """Return `log-<stamp>/log-<stamp>.mcap`: a bag of ROS 2 is a folder."""
     name = f"log-{stamp}"
-    return parent / name / f"{name}.mcap"
+    return Path(name) / f"{name}.mcap"

@@ -29,17 +29,13 @@ PASSED_ON = (
     "payload_mass_kg",
 )
 
-
-@dataclass(frozen=True)
-class Criteria:
-    """Criteria of a completed mission."""
-
-    away_m: float = 0.05  # from the payload's start position, and above its lowest position
-    held_s: float = 0.5  # minimum duration of both; a fall from the stand is shorter
-    place_m: float = 0.15  # horizontal distance of the payload from the drop point
-    risen: float = 0.5  # share of the reference's rise, below which the vehicle never took off
-    landing_m: float = 0.15  # horizontal distance of the vehicle from the landing point
-    rest_m_s: float = 0.02  # speed below which the payload is at rest
+# criteria of a completed mission
+AWAY = 0.05  # [m] of the payload from its start position, and above its lowest position
+HELD = 0.5  # [s] minimum duration of both; a fall from the stand is shorter
+PLACE = 0.15  # [m] horizontal distance of the payload from the drop point
+RISEN = 0.5  # share of the reference's rise, below which the vehicle never took off
+LANDING = 0.15  # [m] horizontal distance of the vehicle from the landing point
+REST = 0.02  # [m/s] speed below which the payload is at rest
 
 
 @dataclass(frozen=True)
@@ -57,7 +53,6 @@ def compute(
     series: Series,
     info: Mapping[str, Any],
     latency_s: Sequence[float] | np.ndarray | None = None,
-    criteria: Criteria | None = None,
 ) -> dict[str, Any]:
     """Return the content of metrics.json.
 
@@ -67,15 +62,13 @@ def compute(
     `landing_point` [x, y] (default the take-off point) [m], `missed_ticks`.
     latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
     """
-    criteria = criteria or Criteria()
-    payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"), criteria)
+    payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"))
     landing = landing_error(series, info.get("landing_point") or takeoff_point(series))
     shortfalls = what_is_missing(
-        flown=left_the_ground(series, criteria),
+        flown=left_the_ground(series),
         landing_error_m=landing,
         abort_reason=info.get("abort_reason") or "",
         payload=payload,
-        criteria=criteria,
         grasps=info.get("grasps") or [],
         to_carry=bool(info.get("payload_mass_kg")),
     )
@@ -127,10 +120,7 @@ def errors(series: Series, figure: Figure = rms) -> dict[str, list[float]]:
 
 
 def payload_facts(
-    series: Series,
-    mass: float | None,
-    drop_point: Sequence[float] | None,
-    criteria: Criteria,
+    series: Series, mass: float | None, drop_point: Sequence[float] | None
 ) -> Payload:
     """Return whether the magnet lifted the payload, and its final position error.
 
@@ -145,9 +135,9 @@ def payload_facts(
     start, end = series.row_at(spans[0][0]), series.row_at(spans[-1][1])
     carried, time = place[start : end + 1], series.time[start : end + 1]
     rise = float(np.max(carried[:, 2] - place[start, 2]))
-    away = np.linalg.norm(carried - place[start], axis=1) >= criteria.away_m
-    above = carried[:, 2] - np.nanmin(place[:, 2]) >= criteria.away_m
-    when = _first_held(time, away & above, criteria.held_s)
+    away = np.linalg.norm(carried - place[start], axis=1) >= AWAY
+    above = carried[:, 2] - np.nanmin(place[:, 2]) >= AWAY
+    when = _first_held(time, away & above, HELD)
     lifted = when is not None
     if drop_point is None:
         return Payload(lifted, when, rise)
@@ -156,7 +146,7 @@ def payload_facts(
     before = series.row_at(series.time[-1] - 0.5)
     elapsed = series.time[-1] - series.time[before]
     speed = float(np.linalg.norm(place[-1] - place[before])) / elapsed if elapsed > 0.0 else 0.0
-    return Payload(lifted, when, rise, distance, speed <= criteria.rest_m_s)
+    return Payload(lifted, when, rise, distance, speed <= REST)
 
 
 def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None:
@@ -176,8 +166,8 @@ def takeoff_point(series: Series) -> tuple[float, float]:
     return float(series["reference.x"][row]), float(series["reference.y"][row])
 
 
-def left_the_ground(series: Series, criteria: Criteria) -> bool:
-    """Return whether the vehicle has risen, by `risen` of the rise of its reference.
+def left_the_ground(series: Series) -> bool:
+    """Return whether the vehicle has risen, by RISEN of the rise of its reference.
 
     Without a true height (a real vehicle) the flown phases count.
     """
@@ -186,7 +176,7 @@ def left_the_ground(series: Series, criteria: Criteria) -> bool:
     true, desired = (series[name][series.flown] for name in ("truth.z", "reference.z"))
     if not np.isfinite(true).all():
         return True
-    return float(np.ptp(true)) >= criteria.risen * float(np.nanmax(desired) - desired[0])
+    return float(np.ptp(true)) >= RISEN * float(np.nanmax(desired) - desired[0])
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:
@@ -204,7 +194,6 @@ def what_is_missing(
     landing_error_m: float | None,
     abort_reason: str,
     payload: Payload,
-    criteria: Criteria,
     grasps: Sequence[Mapping[str, Any]] = (),
     to_carry: bool = False,
 ) -> list[str]:
@@ -219,14 +208,14 @@ def what_is_missing(
     missing = []
     if landing_error_m is None:
         missing.append("not landed")
-    elif not landing_error_m <= criteria.landing_m:
+    elif not landing_error_m <= LANDING:
         missing.append(f"landed {landing_error_m:.2f} m from the landing point")
     if left_behind(grasps, to_carry) and not payload.lifted:
         missing.append(f"payload {grasps[-1]['text']}")
     elif payload.lifted is False:
         missing.append(f"payload not lifted (rose {payload.lift_height_m:.3f} m)")
     elif payload.place_error_m is not None:
-        if not payload.place_error_m <= criteria.place_m:
+        if not payload.place_error_m <= PLACE:
             missing.append(f"payload {payload.place_error_m:.2f} m from the drop point")
         elif not payload.at_rest:
             missing.append("payload still moving at the end")

@@ -32,6 +32,7 @@ GEOMS = 2000
 # Pixels of the shadow map, samples per pixel; coarse: pictures of up to LOW rows, as in a video.
 # Without a GPU smooth edges double the time of a picture, and the video's compression hides them.
 COARSE, FINE, LOW = (1024, 0), (2048, 4), 600
+STRIP_COLUMNS, STRIP_WIDTH, STRIP_GAP = 3, 1560, 6  # the last two in pixels
 WHITE = (255, 255, 255)
 SHADE = (20, 30, 40, 150)
 SIZE = (848, 480)  # pixels; H.264 needs even numbers
@@ -205,10 +206,10 @@ def labelled(pixels: np.ndarray, left: str, right: str, part: float = 0.07) -> I
     return picture
 
 
-def strip(pictures: list[Image.Image], columns: int = 3, width: int = 1560) -> Image.Image:
-    """Return the pictures side by side in rows, `width` pixels in total."""
-    gap = 6
-    columns = min(columns, len(pictures))
+def strip(pictures: list[Image.Image]) -> Image.Image:
+    """Return the pictures side by side in rows."""
+    width, gap = STRIP_WIDTH, STRIP_GAP
+    columns = min(STRIP_COLUMNS, len(pictures))
     each = (width - gap * (columns - 1)) // columns
     height = round(each * pictures[0].height / pictures[0].width)
     rows = -(-len(pictures) // columns)

@@ -11,7 +11,7 @@ import argparse
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -51,18 +51,11 @@ class Rendering:
     A context manager: the child has ended after the `with` block.
     """
 
-    def __init__(
-        self, directory: Path, video: bool = True, platforms: Sequence[str] | None = None
-    ) -> None:
-        """Start to render the flight in `directory` to `directory`/figures.
-
-        platforms: values of MUJOCO_GL to try; default: that of the environment, then PLATFORM.
-        """
-        if platforms is None:
-            platforms = list(dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM))))
+    def __init__(self, directory: Path, video: bool = True) -> None:
+        """Start to render the flight in `directory` to `directory`/figures."""
         self._directory, self._video = directory, video
-        self._child = self._start(platforms[0])
-        self._further = platforms[1:]
+        first, *self._further = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
+        self._child = self._start(first)
 
     def _start(self, platform: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(self._directory)]
