@@ -1,13 +1,15 @@
 """What a command refuses is one line; a mistake of the program is raised."""
 
+import signal
 import subprocess
 import sys
+import time
 from argparse import Namespace
 
 import pytest
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.cli.main import main
+from uam_lab.cli.main import interrupt, main
 from uam_lab.cli.parser import run
 
 
@@ -64,6 +66,23 @@ finally:
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout.splitlines()[-1] == "0 False", done.stderr
+
+
+def test_ctrl_c_that_a_compilation_would_lose_comes_behind_it():
+    passed = []
+
+    def _raw_object_cache_notify():  # as llvmlite's, which LLVM calls
+        signal.raise_signal(signal.SIGINT)
+        passed.append("whole")
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            _raw_object_cache_notify()
+            time.sleep(10.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert passed == ["whole"]
 
 
 def test_an_empty_name_is_not_the_present_folder(capsys):

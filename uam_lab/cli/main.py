@@ -10,11 +10,14 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from types import FrameType
 
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 
 UTF_8 = "PYTHONUTF8"  # variable of Python
 WITHOUT_NODES = {"-h", "--help", "direct", "--engine=direct"}
+COMPILING = "_raw_object_cache_notify"  # of llvmlite: LLVM calls it, an exception in it is lost
+AGAIN = 0.02  # [s]
 _early = contextlib.ExitStack()  # ends what began before the command
 
 
@@ -39,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from uam_lab.cli.parser import parsed, run  # takes a second or two
 
         options = parsed(given)
+    if arguments is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
     status = run(options)
     if arguments is None:
         signal.signal(signal.SIGINT, _end)  # the end of the program takes a moment
@@ -66,6 +71,16 @@ def _ended_by_interrupt() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def interrupt(_: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt; within a function that would lose it, a moment later."""
+    while frame is not None and frame.f_code.co_name != COMPILING:
+        frame = frame.f_back
+    if frame is None:
+        raise KeyboardInterrupt
+    here = threading.main_thread().ident
+    threading.Timer(AGAIN, signal.pthread_kill, (here, signal.SIGINT)).start()
 
 
 def _end(*_: object) -> None:
