@@ -71,6 +71,7 @@ def test_the_mission_knows_the_grippers_numbers():
         ("derives: own\n", "derives: own.yaml derives from own.yaml"),
         ("derives: s500_arm\ngripper: {type: two_finger, body: link_2, position: [0, 0, 0]}\n",
          "gripper: the vehicle has a magnet, too"),
+        ("derives: s500_arm\ngripper: none\n", "gripper: none, but the vehicle has a magnet, too"),
         ("derives: s500_gripper\ngripper: {opening: [0.05, 0.02]}\n", "[0.05, 0.02]: closed"),
         ("derives: s500_gripper\ngripper: {force: 0}\n", "gripper.force: 0 is not above 0"),
         ("derives: s500_gripper\ngripper: {type: pincers}\n", "unknown gripper 'pincers'"),
@@ -128,6 +129,13 @@ def test_a_vehicle_without_a_gripper_refuses_a_scenario_that_grips(tmp_path):
     assert bare.gripper.kind == "none"
     with pytest.raises(ScenarioError, match="magnet: bare has no gripper"):
         load_scenario("two_finger", bare)
+
+
+def test_a_vehicle_without_a_magnet_whose_model_has_one_says_what_to_do(tmp_path):
+    file = tmp_path / "bare.yaml"
+    file.write_text("derives: s500_arm\nmagnet: null\n")
+    with pytest.raises(VehicleError, match="'magnet_swing' is a magnet's.*leave it out"):
+        MujocoPlant(Vehicle.of(load_description(file)), 0.0, 1)
 
 
 def sight(opening: float, squeeze: float, tracked: bool = True, **more) -> Sight:

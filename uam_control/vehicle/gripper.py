@@ -12,6 +12,7 @@ from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 
 KINDS = NO_GRIPPER, MAGNET, TWO_FINGER = "none", "magnet", "two_finger"
+TWO_ENTRIES = "the vehicle has a magnet, too: magnet: null leaves it out"
 NEARLY = 0.1  # of a gripper's stroke: as near to its closed end, a command closes it
 POSITIVE = (
     *("force", "speed", "friction", "transmission", "inertia", "stall_torque", "no_load_speed"),
@@ -91,6 +92,8 @@ def completed(document: dict[str, Any], file: Path, error: type[ValueError]) -> 
     if not top.has("gripper"):
         return document
     if document["gripper"] == NO_GRIPPER:
+        if top.has("magnet"):
+            raise top.error("gripper", f"{NO_GRIPPER}, but {TWO_ENTRIES}")
         return {key: value for key, value in document.items() if key != "gripper"}
     entry = top.section("gripper")
     given = configuration.beside(file, "grippers", entry.text("type"))
@@ -106,7 +109,7 @@ def check_gripper(top: Section) -> None:
         return
     g = top.section("gripper")
     if top.has("magnet"):
-        raise top.error("gripper", "the vehicle has a magnet, too: magnet: null leaves it out")
+        raise top.error("gripper", TWO_ENTRIES)
     g.one_of("kind", (TWO_FINGER,))
     for name in ("type", "body"):
         g.text(name)

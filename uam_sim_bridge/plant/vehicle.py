@@ -122,6 +122,11 @@ class Vehicle:
                 raise VehicleError(f"{described.model}: no {kind} '{missing[0]}'")
         moved = FINGERS if described.gripper.kind == TWO_FINGER else swing
         strange = sorted(joints - {BASE, PAYLOAD, *moved, *described.joint_names})
+        if SWING in strange:
+            raise VehicleError(
+                f"{described.model}: joint '{SWING}' is a magnet's, and {described.file.name} has "
+                "no magnet: leave it out of the MJCF, too, or name it in gripper.instead_of"
+            )
         if strange:
             raise VehicleError(
                 f"{described.model}: joint '{strange[0]}' is not in {described.file.name}, "
