@@ -273,7 +273,7 @@ def test_parameters_that_contradict_are_refused(change, text):
         (("a", "c"), "claw", "joint 'b' is not among: a, c"),
         (("a", "b", "c", "d"), "claw", "no joint 'd'"),
         (("a", "b"), "claw", "joint 'c' is not among: a, b"),
-        (("a", "b", "c"), "jaw", "no site 'jaw'"),
+        (("a", "b", "c"), "jaw", "no site 'jaw'; there are: claw"),
         (("base",), "", "joint 'base' is no hinge"),
         (("b", "a"), "", "joint 'a' is not next"),
         ((), "", "0 joints; an arm has 1 to 7"),

@@ -186,6 +186,10 @@ def test_arm_angles_are_flown(tmp_path):
             "line 3 column qw: the quaternion's norm is 0, 1 expected",
         ),
         (
+            {"header": "t,px,py,pz,yaw", "rows": ["0,0,0,1,90", "1,0,0,1,90"]},
+            "line 2 column yaw: 90 rad, more than two turns; give the heading in radians",
+        ),
+        (
             {
                 "header": HEADER + ",alpha_1",
                 "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"],

@@ -163,7 +163,9 @@ class ChainReader:
         found |= {"swing_reach": none, "swing_mass": 0.0, "swing_centre": none}
         if (site := hand_site(self._model, end_effector)) < 0:
             if end_effector:
-                raise ValueError(f"no site '{end_effector}'")
+                sites = (self._model.site(i).name for i in range(self._model.nsite))
+                there = ", ".join(filter(None, sites))
+                raise ValueError(f"no site '{end_effector}'; there are: {there or 'none'}")
             return found
         data = self._data
         place = self._inside(data.site_xpos[site])

@@ -65,6 +65,7 @@ PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
 LONG, CRAWL, FAR = 600.0, 0.01, 0.1  # [s, m/s, m] a race of 10 m/s, its times in ms, crawls
 LARGEST = 1e6  # [SI] of a position, rate or angle
 UNIT = 0.02  # largest deviation of a quaternion's norm from 1
+FIRST_YAW = 4.0 * np.pi  # [rad] two turns: a larger heading of the first row is in degrees
 # rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
 FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
 
@@ -306,6 +307,9 @@ def _yaw(table: _Table) -> np.ndarray:
             raise table.error(row, "qw", f"the quaternion's norm is {norm[row]:.3g}, 1 expected")
         w, x, y, z = quaternion.T
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[:, None]
+    elif yaw is not None and abs(first := float(yaw[0, 0])) > FIRST_YAW:
+        text = f"{first:g} rad, more than two turns; give the heading in radians, not in degrees"
+        raise table.error(0, "yaw", text)
     return np.zeros((len(table.times), 1)) if yaw is None else np.unwrap(yaw, axis=0)
 
 
