@@ -133,7 +133,7 @@ def test_a_written_calibration_is_read_back(tmp_path_factory, up, heading, origi
         up, math.radians(heading), origin, tuple(quaternion(euler)), pivot, {"distance_m": 1.0}
     )
     file = tmp_path_factory.getbasetemp() / "calibration.yaml"
-    calibrations.write(made, file)
+    file.write_text(calibrations.text(made))
     read = calibrations.load(str(file))
     assert read.up == up and read.measured == {"distance_m": 1.0}
     np.testing.assert_allclose(math.degrees(read.heading), heading, atol=1e-3, rtol=1e-5)
