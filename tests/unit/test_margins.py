@@ -12,7 +12,7 @@ from uam_control.estimation.filters import low_pass_step
 from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
-from uam_lab.cli.margins import verdict
+from uam_lab.experiments.margins.cases import verdict
 from uam_lab.experiments.margins.linear import (
     IN,
     LinearBlock,

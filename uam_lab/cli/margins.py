@@ -27,7 +27,6 @@ from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 
 STABLE, UNSTABLE = 0, 1
-TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
 
 
 def add(command: Command) -> None:
@@ -48,7 +47,7 @@ def add(command: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.margins import report
-    from uam_lab.experiments.margins.cases import cases_of, flown_gains, smallest_delay
+    from uam_lab.experiments.margins.cases import cases_of, flown_gains, smallest_delay, verdict
     from uam_lab.experiments.margins.pose_delay import pose_delay
     from uam_lab.experiments.margins.stack_model import MODELLED
     from uam_lab.experiments.trials.trial import Trial, recorded
@@ -97,12 +96,3 @@ def run(options: argparse.Namespace) -> int:
     say(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
     say(f"results  {out}")
     return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE
-
-
-def verdict(stated: float, computed: float) -> str:
-    """Return how the profile's delay_margin [s] compares with the computed margin [s]."""
-    if stated > TOLERANCE * computed:
-        return f"too large: computed {computed:.4f} s"
-    if stated < computed / TOLERANCE / TOLERANCE:
-        return f"smaller than necessary: computed {computed:.4f} s"
-    return "as computed"

@@ -143,3 +143,12 @@ def flown_gains(profile: Profile, series: Series) -> dict[str, np.ndarray]:
         rho = float(np.percentile(rows[:, names.index("rho")] / layer, PERCENTILE))
         found[subsystem] = np.array([max(rho - zeta, 0.0), 0.0, 0.0, 0.0, zeta])
     return found
+
+
+def verdict(stated: float, computed: float) -> str:
+    """Return how the profile's delay_margin [s] compares with the computed margin [s]."""
+    if stated > TOLERANCE * computed:
+        return f"too large: computed {computed:.4f} s"
+    if stated < computed / TOLERANCE / TOLERANCE:
+        return f"smaller than necessary: computed {computed:.4f} s"
+    return "as computed"
