@@ -110,11 +110,11 @@ def run(options: argparse.Namespace) -> int:
         return status or (NOT_WRITTEN if lost else 0)
     except BaseException as error:
         expected = isinstance(error, OSError) or type(error).__module__.startswith(OURS)
-        if not expected and _interrupted(error):
+        if not expected:
+            if not _interrupted(error):
+                raise
             say(f"uam {options.command}: interrupted", error=True)
             return INTERRUPTED
-        if not expected:
-            raise
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
             return NOT_WRITTEN

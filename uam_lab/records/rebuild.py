@@ -1,6 +1,5 @@
 """Rebuild a result folder from its log alone: table, metrics, facts."""
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from uam_lab.records.recording import log_facts
 from uam_lab.records.recording.log_reader import read_flight
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results import timeseries
-from uam_lab.records.results.atomic import write_text
+from uam_lab.records.results.atomic import copy, write_text
 from uam_lab.records.results.outcome import complete
 from uam_lab.records.results.result_folder import (
     LOG,
@@ -72,7 +71,7 @@ def copy_flight(directory: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for name in (TABLE, "metrics.json", "info.json", *FILES):
         if (directory / name).exists():
-            shutil.copyfile(directory / name, out / name)
+            copy(directory / name, out / name)
 
 
 def series_of(directory: Path) -> timeseries.Series:
