@@ -73,7 +73,7 @@ def hover_thrust(plant: MujocoPlant, angles: np.ndarray, carried: bool) -> np.nd
         places = data.xipos[parts]
     standing, torque = np.zeros(3), np.zeros(3)
     if (load := plant.effects.acting.get("standing_load")) is not None:
-        standing, torque = load.arrays.load
+        standing, torque = load.arrays[2]
     air = plant.vehicle.numbers["air"]
     pushed = standing + np.multiply(air["drag"], air["wind"])
     middle, weight = mass @ places / mass.sum(), mass.sum() * described.gravity

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effects_rig import flown, plant, tick
 
-from uam_sim_bridge.plant.effects.joint_gear import Gear, followed, gear_step, rigid_step
+from uam_sim_bridge.plant.effects.joint_effects import Gear, followed, gear_step, rigid_step
 from uam_sim_bridge.plant.engines import PlantError
 
 LEVEL = np.eye(3).ravel()
@@ -115,10 +115,10 @@ def test_cables_pull_to_their_rest_angle():
 
 def test_the_current_loop_s_noise_has_its_size_and_bandwidth_at_every_joint():
     one = plant("servo_noise:torque=0.02/0.01,bandwidth=5")
-    noise, states = one.effects.acting["servo_noise"], []
+    (_, _, noise, _), states = one.effects.acting["servo_noise"].arrays, []
     for _ in range(20000):
         tick(one, "servo_noise")
-        states.append(noise.arrays.noise.copy())
+        states.append(noise.copy())
     states = np.array(states)
     assert states.std(axis=0) == pytest.approx([0.02, 0.01], rel=0.1)
     kept = [np.corrcoef(column[1:], column[:-1])[0, 1] for column in states.T]

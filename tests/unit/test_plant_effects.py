@@ -13,12 +13,17 @@ from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.acting_effects import generator
-from uam_sim_bridge.plant.effects.battery_sag import discharge
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
-from uam_sim_bridge.plant.effects.downwash import momentum
 from uam_sim_bridge.plant.effects.effect import Acting, Effect, size
-from uam_sim_bridge.plant.effects.ground_effect import raise_thrust, thrust_ratio
-from uam_sim_bridge.plant.effects.propeller_vibration import Shaken, mean_of_wave, vibrate
+from uam_sim_bridge.plant.effects.load_effects import momentum
+from uam_sim_bridge.plant.effects.rotor_effects import (
+    Shaken,
+    discharge,
+    mean_of_wave,
+    raise_thrust,
+    thrust_ratio,
+    vibrate,
+)
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -177,18 +182,19 @@ def test_rotors_differ_but_not_wildly_and_lags_with_them():
 def test_the_battery_sags_by_charge_and_current_by_hand():
     one = plant("battery_sag:start=1", payload=0.0)
     battery = one.effects.acting["battery_sag"].arrays
+    numbers = battery[-1]
     one.rotors.thrust[:] = 5.4
     # ideal power 5.4^1.5 / sqrt(2 1.2 pi 0.127^2) = 35.98 W per rotor; 4 / 0.6 of it and 20 W
     power = 4 * 35.98 / 0.6 + 20.0
     discharge(battery)
     assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2)  # full, no current yet
     gain = 1.0 - math.exp(-0.004 / 0.1)
-    assert battery.numbers["current"] == pytest.approx(gain * power / 16.2, rel=1e-3)
-    battery.numbers["current"] = 16.0
+    assert numbers["current"] == pytest.approx(gain * power / 16.2, rel=1e-3)
+    numbers["current"] = 16.0
     discharge(battery)
     sag = (16.2 - 4 * 0.005 * 16.0) / 16.2  # 0.98025
     assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2 * sag**2, rel=1e-5)
-    battery.numbers["charge"] = 0.0
+    numbers["charge"] = 0.0
     discharge(battery)
     assert one.rotors.constants[1] < 8.549e-6 * 1100.0**2 * (3.6 / 4.05) ** 2
 
@@ -253,7 +259,7 @@ def test_rotors_differ_from_the_file_by_the_factors():
 
 def test_the_thrust_fades_from_lift_off_on():
     one = plant("thrust_fade:per_minute=0.06", payload=0.0)
-    part = one.effects.acting["thrust_fade"].arrays.part
+    part = one.effects.acting["thrust_fade"].arrays[2]
     for thrust, left in ((5.0, 1.0), (5.5, 0.999), (5.0, 0.998)):  # weight: 21.6 N
         one.rotors.thrust[:] = thrust
         for _ in range(250):

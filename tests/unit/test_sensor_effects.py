@@ -9,10 +9,8 @@ from effects_rig import flown, plant
 from uam_sim_bridge.mavlink.transport.faulty_transport import LateTransport
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.arm_occlusion import distance, hide, seen_markers, shift_pose
-from uam_sim_bridge.plant.effects.mocap_dropouts import drop
-from uam_sim_bridge.plant.effects.mocap_jitter import jitter
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
-from uam_sim_bridge.plant.effects.odometry_drift import express, jump
+from uam_sim_bridge.plant.effects.pose_effects import drop, express, jitter, jump
 
 LEVEL = np.eye(3).ravel()
 SENSING = ("propeller_vibration", "mocap_jitter", "mocap_dropouts", "arm_occlusion")
@@ -131,7 +129,7 @@ def test_an_odometry_drifts_and_jumps_as_often_as_said():
     for _ in range(2400):  # 20 s at 120 Hz
         one.effects.draw()
         acting.steps["pose"](acting.arrays)
-        drift.append(acting.arrays.frame[:3].copy())
+        drift.append(acting.arrays[4][:3].copy())
     ways = np.linalg.norm(np.diff(drift, axis=0), axis=1)
     assert 8 <= np.count_nonzero(ways) <= 30 and ways[ways > 0.0] == pytest.approx(0.3)
     one = plant("odometry_drift:walk=0.1,turn=0,jumps=0,jump=0,jump_turn=0")
@@ -139,7 +137,7 @@ def test_an_odometry_drifts_and_jumps_as_often_as_said():
     for _ in range(12000):
         one.effects.draw()
         acting.steps["pose"](acting.arrays)
-        drift.append(acting.arrays.frame[:3].copy())
+        drift.append(acting.arrays[4][:3].copy())
     seconds = np.diff(drift[::120], axis=0)
     assert np.std(seconds) == pytest.approx(0.1, rel=0.2)
 

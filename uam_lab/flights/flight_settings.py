@@ -38,7 +38,7 @@ from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.hil.hil_server import open_only_here
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
-from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
+from uam_sim_bridge.plant.effects.pose_effects import OdometryDrift
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.px4_installation import Px4Installation

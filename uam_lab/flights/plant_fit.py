@@ -10,10 +10,9 @@ from uam_control.coordinates import CHI, YAW
 from uam_control.mission.motion.trajectory import reference_rows
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.profiles.profile import Profile
-from uam_sim_bridge.plant.effects.battery_sag import BatterySag
-from uam_sim_bridge.plant.effects.mismatches import RotorMismatch
+from uam_sim_bridge.plant.effects.load_effects import StandingLoad
 from uam_sim_bridge.plant.effects.presets import Effects
-from uam_sim_bridge.plant.effects.standing_load import StandingLoad
+from uam_sim_bridge.plant.effects.rotor_effects import BatterySag, RotorMismatch
 
 HALF = 0.5  # of the torque, of the battery, that a vehicle needs
 TURNED = math.radians(90.0)  # of the heading, beyond which what turns with it is another force

@@ -61,7 +61,7 @@ from uam_sim_bridge.nodes.plant_topics import (
 from uam_sim_bridge.paced_clock import PacedClock, Patience
 from uam_sim_bridge.plant import PhysicsError, Vehicle, warm_up
 from uam_sim_bridge.plant.effects import presets
-from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
+from uam_sim_bridge.plant.effects.pose_effects import OdometryDrift
 
 NAME = "mujoco_sim"
 RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"

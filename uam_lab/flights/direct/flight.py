@@ -28,7 +28,7 @@ from uam_sim_bridge.faults.faulty_plant import DirectFaults, make_plant
 from uam_sim_bridge.nodes.bridge_parameters import check_names
 from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
-from uam_sim_bridge.plant.effects.odometry_drift import OdometryDrift
+from uam_sim_bridge.plant.effects.pose_effects import OdometryDrift
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
 

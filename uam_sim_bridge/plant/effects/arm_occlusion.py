@@ -10,7 +10,7 @@ flight: the pose jumps when the set of seen markers changes, by the mean of the 
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ AT_THE_TIP = 0.1  # [m] distance up to which the payload covers markers
 class ArmOcclusion(Effect):
     """Arm and payload hide markers from cameras: the pose jumps a little, or is lost."""
 
-    SOURCE: ClassVar[str] = (
+    SOURCE = (
         "geometry; two cameras per marker and three markers per rigid body: OptiTrack, Motive; "
         "cameras and calibration error: assumptions (8 cameras on a ring of 4 m)"
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from uam_sim_bridge.plant.sensors import Noise, NoiseArrays, next_row
 class NetworkDelay(Effect):
     """Setpoints reach the autopilot later, and poses the companion computer."""
 
-    SOURCE: ClassVar[str] = (
+    SOURCE = (
         "setpoints: p50 4 ms and p99 12 ms, measured on this stack with PX4 v1.16 paced by the "
         "wall clock; poses: the same shape on Wi-Fi, assumption"
     )

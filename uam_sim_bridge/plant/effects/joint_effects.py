@@ -1,7 +1,10 @@
-"""Gear of the joint servos: friction, backlash, tooth stiffness.
+"""Effects of the servos and the arm: noise of the torque, gears, readings, cables.
 
-Friction of the motor's side, semi-implicit: a motor that it can stop stands still. With a width
-friction is smooth in the speed instead, and never takes more than the momentum of a step:
+Noise. White noise through a first-order low-pass, exact for any step: its standard deviation does
+not depend on the step.
+
+Gear. Friction of the motor's side, semi-implicit: a motor that it can stop stands still. With a
+width friction is smooth in the speed instead, and never takes more than the momentum of a step:
 
     |friction| <= (F_c + mu |tau_servo|) (1 + (s - 1) exp(-(theta_m' / v_s)^2))      (Stribeck)
     friction = that limit x tanh(theta_m' / w)                                       with a width w
@@ -17,12 +20,14 @@ The teeth of a joint are softer where its motor and link are too light for the p
 
 Without stiffness the gear is rigid: motor and link are one mass. The servo's encoder is on the
 output shaft, so that it measures the link.
+
+Cables. Those that cross a joint are a spring towards the pose in which they were laid.
 """
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -30,6 +35,48 @@ import numpy as np
 from uam_control.maths.compiled import borrowing
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, each, size
+from uam_sim_bridge.plant.sensors import Noise, next_row
+
+
+class ServoNoise(Effect):
+    """The torque of the servos has noise of their current loops."""
+
+    SOURCE = (
+        "XM430-W350 on a bench, FSC-Lab [srv]: 6 to 10 mA rms, 15 to 24 mN m, 5 Hz; laboratory: "
+        "its 10 mA at the torque per current of the XM430-W210, 1.3 N m/A"
+    )
+
+    torque: tuple[float, ...] = each(
+        "standard deviation, for each joint or for all", "N m", 0.0, 0.5
+    )
+    bandwidth: float = size("of the noise", "Hz", 0.1, 100.0)
+
+    def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
+        count, keep = bench.arm[1], math.exp(-2.0 * math.pi * self.bandwidth * bench.period)
+        sizes = bench.for_each("servo_noise: torque", self.torque, count, "joints")
+        white = Noise(noise, math.sqrt(1.0 - keep * keep) * sizes)
+        arrays = bench.torque_control, white.arrays, np.zeros(count), keep
+        return Compiled(arrays, [white], tick=renew, joints=add)
+
+
+@borrowing
+def renew(a: tuple) -> int:
+    """Advance the present noise (n,) by a tick: `keep` of it, and a row of white noise [N m]."""
+    _, white, noise, keep = a
+    drawn = white.rows[next_row(white)]
+    for i in range(len(noise)):
+        noise[i] = keep * noise[i] + drawn[i]
+    return 0
+
+
+@borrowing
+def add(a: tuple) -> int:
+    """Add the noise to the torques (n,) [N m] on the joints; see `renew`."""
+    torque, _, noise, _ = a
+    for i in range(len(noise)):
+        torque[i] += noise[i]
+    return 0
+
 
 STABLE = 3.0  # of 4, at which steps become unstable
 LINK_ARMATURE = 5e-4  # [kg m^2] left on the link: output shaft and horn
@@ -38,7 +85,7 @@ LINK_ARMATURE = 5e-4  # [kg m^2] left on the link: output shaft and horn
 class JointGear(Effect):
     """The joints' gears have friction by load, more of it at rest, backlash and elastic teeth."""
 
-    SOURCE: ClassVar[str] = (
+    SOURCE = (
         "backlash: ROBOTIS e-manual, X series, 15 arcmin; Stribeck friction of such servos: "
         "Duclusaud et al. 2024, arXiv 2410.08650; load: XM430-W350 on a bench, FSC-Lab [srv], the "
         "mean of its two loaded joints, 0.246 and 0.161; friction at rest / in motion, stiffness: "
@@ -180,3 +227,69 @@ def gear_step(
         speed[i] = (free + braked(gear, i, torque[i], speed[i], free)) / gear.inertia[i]
         angle[i] += step * speed[i]
         output[i] = contact
+
+
+class JointReadings(Effect):
+    """The servos report their speed late, and angle and speed in coarse units."""
+
+    SOURCE = (
+        "XM430-W350 of FSC-Lab: present velocity 44 to 56 ms late [wb 2.7, arm]; units: ROBOTIS "
+        "e-manual"
+    )
+
+    delay: float = size("of the speed", "s", 0.0, 0.2)
+    speed_unit: float = size("quantum of the speed", "rad/s", 1e-4, 0.5)
+    counts: float = size("counts of the encoder per turn", "1", 64.0, 1048576.0)
+
+    def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
+        n, ticks = bench.arm[1], round(self.delay / bench.period)
+        bench.encoder_units[:] = 2.0 * np.pi / self.counts, self.speed_unit
+        speeds = bench.sample[6 + n : 6 + 2 * n]
+        arrays = speeds, np.zeros((ticks + 1, n)), np.zeros(1, dtype=np.int64)
+        return Compiled(arrays, sample=hold_back)
+
+
+@borrowing
+def hold_back(a: tuple) -> int:
+    """Exchange the speeds (n,) of a tick for those that are reported at it.
+
+    earlier (ticks + 1, n): of the last ticks, in a ring; place (1,): its row.
+    """
+    speeds, earlier, place = a
+    row = place[0]
+    following = (row + 1) % len(earlier)
+    for i in range(len(speeds)):
+        earlier[row, i] = speeds[i]
+        speeds[i] = earlier[following, i]
+    place[0] = following
+    return 0
+
+
+class CableTorque(Effect):
+    """The cables along the arm pull each joint towards its stowed angle."""
+
+    SOURCE = (
+        "assumption: one servo cable and the magnet's two wires in a loop of some 5 cm; "
+        "0.02 N m/rad is 1 % of the servo's stall torque at 90 deg"
+    )
+
+    stiffness: float = size("torque per angle", "N m/rad", 0.0, 0.5)
+    stiffness_spread: float = size("standard deviation / stiffness, per flight", "1", 0.0, 1.0)
+    rest_spread_deg: float = size("standard deviation of the rest angle, per flight", "deg", 0, 45)
+
+    def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
+        joints = bench.arm[1]
+        drawn = noise.standard_normal((2, joints))
+        stiffness = self.stiffness * np.abs(1.0 + self.stiffness_spread * drawn[0])
+        rest = bench.vehicle.description.stowed + np.radians(self.rest_spread_deg) * drawn[1]
+        torque = bench.data.qfrc_applied[bench.arm_dofs]
+        return Compiled((torque, bench.angles, stiffness, rest), tick=pull)
+
+
+@borrowing
+def pull(a: tuple) -> int:
+    """Set the torques (n,) [N m] of springs: their angles, stiffnesses and rest angles (n,)."""
+    torque, angles, stiffness, rest = a
+    for i in range(len(torque)):
+        torque[i] = stiffness[i] * (rest[i] - angles[i])
+    return 0
