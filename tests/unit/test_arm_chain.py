@@ -13,7 +13,7 @@ from uam_control.settings.section import Section
 from uam_control.vehicle import load_description
 from uam_sim_bridge.devices.dynamixel.budget import budget
 from uam_sim_bridge.devices.dynamixel.chain import ArmError, describe_chain, hardware_file
-from uam_sim_bridge.devices.dynamixel.goals import friction_torque
+from uam_sim_bridge.devices.dynamixel.driver import friction_torque
 from uam_sim_bridge.devices.serial.serial_port import latency_timer
 
 VEHICLE = load_description()

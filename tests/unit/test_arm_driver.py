@@ -11,12 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from servo_shafts import StillShaft
 
+from uam_sim_bridge.devices.dynamixel.bus import BusLost
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
-from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
+from uam_sim_bridge.devices.dynamixel.driver import ArmDriver, goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
-from uam_sim_bridge.devices.dynamixel.goals import goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.servo_bus import BusLost
 
 UNIT = 0.00269 * 1.304  # [N m] of one count of current
 

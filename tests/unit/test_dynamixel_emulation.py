@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from servo_shafts import FrictionShaft, StillShaft
 from set_clock import SetClock
 
-from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
+from uam_sim_bridge.devices.dynamixel.bus import BusLost, DynamixelBus, NoAnswer, Refused
 from uam_sim_bridge.devices.dynamixel.control_table import (
     ControlTableError,
     control_table,
@@ -26,8 +26,8 @@ from uam_sim_bridge.devices.dynamixel.emulated import (
     ServoLine,
 )
 from uam_sim_bridge.devices.dynamixel.health import ERRORS, advice, hardware_errors
+from uam_sim_bridge.devices.dynamixel.protocol import word
 from uam_sim_bridge.devices.serial.serial_port import SerialPort
-from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, word
 
 TABLE = control_table("xm430_w210")
 TORQUE, MODE, CURRENT = TABLE["Torque Enable"], TABLE["Operating Mode"], TABLE["Goal Current"]

@@ -6,11 +6,16 @@ from hypothesis import strategies as st
 from servo_shafts import StillShaft
 from set_clock import SetClock
 
-from uam_sim_bridge.devices.dynamixel.bus import LATEST, DynamixelBus, Instruction, Overdue
+from uam_sim_bridge.devices.dynamixel.bus import (
+    LATEST,
+    DynamixelBus,
+    Instruction,
+    NoAnswer,
+    Overdue,
+)
 from uam_sim_bridge.devices.dynamixel.control_table import control_table
 from uam_sim_bridge.devices.dynamixel.emulated import EmulatedServo, ServoLine
 from uam_sim_bridge.devices.dynamixel.protocol import READ, Packet
-from uam_sim_bridge.devices.servo_bus import NoAnswer
 
 TABLE = control_table("xm430_w210")
 # of one byte, two and four: each with another content

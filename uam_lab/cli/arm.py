@@ -24,13 +24,12 @@ from uam_lab.cli.command import Command
 from uam_lab.flights.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import Terminal, say
 from uam_sim_bridge.devices.dynamixel import control_table as names
-from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus, tried
 from uam_sim_bridge.devices.dynamixel.chain import SPEEDS, ArmChain, ArmError
 from uam_sim_bridge.devices.dynamixel.control_table import model_name
 from uam_sim_bridge.devices.dynamixel.driver import NEEDED_LATENCY, ArmDriver
 from uam_sim_bridge.devices.dynamixel.health import advice
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.servo_bus import tried
 
 AS_DESCRIBED, OTHERWISE = 0, 1
 

@@ -30,6 +30,7 @@ from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
 from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refuse_unknown
+from uam_sim_bridge.devices.dynamixel.bus import BusLost
 from uam_sim_bridge.devices.dynamixel.chain import (
     DEFAULT_HARDWARE,
     ArmChain,
@@ -39,7 +40,6 @@ from uam_sim_bridge.devices.dynamixel.chain import (
 )
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver, Reading
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
-from uam_sim_bridge.devices.servo_bus import BusLost
 from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.paced_clock import PacedClock
 

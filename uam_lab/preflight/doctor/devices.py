@@ -7,13 +7,13 @@ from pathlib import Path
 from uam_lab.flights.vehicle.devices import devices
 from uam_lab.flights.vehicle.lab import GPIO, Lab
 from uam_lab.preflight.doctor.finding import Finding, fail, ok
+from uam_sim_bridge.devices.dynamixel.bus import BusLost
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.driver import ArmDriver
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.mocap import measurement
 from uam_sim_bridge.devices.mocap.frame import MocapError
 from uam_sim_bridge.devices.mocap.mocap_parameters import MocapParameters, open_source
-from uam_sim_bridge.devices.servo_bus import BusLost
 
 SLOW_ANSWER = 0.05  # [s] of a servo: this computer may be busy
 

@@ -4,20 +4,34 @@ An answer has no number that names its instruction. After a stall of the compute
 the answer to an instruction that was given up may come in place of the next one: see `Overdue`.
 """
 
+import errno
+import os
+import termios
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import TypeVar
+
+import serial
 
 from uam_sim_bridge.devices.dynamixel import protocol
-from uam_sim_bridge.devices.dynamixel.protocol import ALERT, BROADCAST, STATUS, Packet, PacketReader
+from uam_sim_bridge.devices.dynamixel.control_table import Register
+from uam_sim_bridge.devices.dynamixel.protocol import (
+    ALERT,
+    BROADCAST,
+    STATUS,
+    Packet,
+    PacketReader,
+    word,
+)
 from uam_sim_bridge.devices.serial.serial_port import SerialPort
-from uam_sim_bridge.devices.servo_bus import NoAnswer, Refused, Register, ServoBus, word
 
 EMPTY_STATUS = 11  # bytes of a status packet without data
 FAST_HEAD = 8  # bytes of the answer to a Fast Sync Read before its first error
 SCAN_SLOT = 0.003  # [s] for each id of a broadcast ping
+ATTEMPTS = 3  # pings and reads at the start: a single bit error is no missing servo
 LATEST = 1.0  # [s] an answer comes within this time, or it is lost
 REFUSALS = {
     1: "the servo could not execute it",
@@ -28,6 +42,24 @@ REFUSALS = {
     6: "value beyond its limit register",
     7: "not accessible; EEPROM is locked while torque is on",
 }
+
+T = TypeVar("T")
+
+
+class BusLost(OSError):
+    """The device is gone or cannot be opened; the text is one line."""
+
+
+class NoAnswer(RuntimeError):
+    """A servo did not answer, or its answer was damaged; the text is one line."""
+
+    def __init__(self, text: str, damaged: bool = False) -> None:
+        super().__init__(text)
+        self.damaged = damaged
+
+
+class Refused(RuntimeError):
+    """A servo refused an instruction; the text is one line."""
 
 
 @dataclass(frozen=True)
@@ -90,23 +122,85 @@ class Overdue:
         return False
 
 
-class DynamixelBus(ServoBus):
-    """A line with servos that understand Protocol 2.0."""
+class DynamixelBus:
+    """A line with servos that understand Protocol 2.0; not for several threads at once.
+
+    `alerts`: ids whose last answer reported a hardware error.
+    """
 
     def __init__(
         self, device: str, baud_rate: int, allowance: float, port: SerialPort | None = None
     ) -> None:
-        super().__init__(device, baud_rate, allowance, port)
+        """allowance [s]: time that an answer has beside the time of its bytes; port: in place of a
+        serial device."""
+        self.device, self.baud_rate = device, baud_rate
+        self.port = port or SerialPort(device, allowance)
+        self.alerts: set[int] = set()
         self._overdue = Overdue()
         self._reader, self._read = PacketReader(), deque[Packet]()
         self._heard = False  # bytes since the last instruction
 
+    def open(self) -> None:
+        """Open the device. Raises BusLost."""
+        with self.guarded():
+            try:
+                self.port.open(self.baud_rate)
+            except ValueError:
+                raise BusLost(f"{self.device}: no baud rate {self.baud_rate}") from None
+
+    def set_baud_rate(self, baud_rate: int) -> None:
+        """Use another baud rate from now on. Raises BusLost."""
+        self.baud_rate = baud_rate
+        self.open()
+
+    def close(self) -> None:
+        """Close the device."""
+        self.port.close()
+
+    @contextmanager
+    def patient(self, allowance: float) -> Iterator[None]:
+        """Give each answer at least `allowance` [s] beside the time of its bytes."""
+        usual = self.port.allowance
+        self.port.allowance = max(usual, allowance)
+        try:
+            yield
+        finally:
+            self.port.allowance = usual
+
+    def read(self, servo: int, register: Register) -> int:
+        """Return the unsigned value of a register. Raises NoAnswer, Refused, BusLost."""
+        return int.from_bytes(self.read_bytes(servo, register), "little")
+
+    def read_signed(self, servo: int, register: Register) -> int:
+        """Return the signed value of a register. Raises NoAnswer, Refused, BusLost."""
+        return int.from_bytes(self.read_bytes(servo, register), "little", signed=True)
+
+    def write(self, servo: int, register: Register, value: int) -> None:
+        """Write a signed value and wait for the status. Raises NoAnswer, Refused, BusLost."""
+        data = word(register.address, 2) + word(value, register.size)
+        self._ask(Packet(servo, protocol.WRITE, data), 0)
+
+    @contextmanager
+    def guarded(self) -> Iterator[None]:
+        """Turn the errors of a lost device into BusLost."""
+        try:
+            yield
+        except BusLost:
+            raise
+        except (OSError, termios.error, serial.SerialException, TypeError) as error:
+            # pyserial raises TypeError for a port that another call has closed
+            raise BusLost(f"{self.device}: {_reason(error)}") from None
+
     def ping(self, servo: int) -> int:
+        """Return the model number of a servo. Raises NoAnswer, BusLost."""
         data = self._ask(Packet(servo, protocol.PING), 3)  # model number and firmware
         return int.from_bytes(data[:2], "little")
 
     def scan(self) -> dict[int, tuple[int, int]]:
-        """See `ServoBus`; takes 0.8 s, and longer at low baud rates."""
+        """Return id → (model number, firmware) of all servos. Raises BusLost.
+
+        It takes 0.8 s, and longer at low baud rates.
+        """
         found, answer = dict[int, bytes](), EMPTY_STATUS + 3
         with self.guarded(), self.patient(SCAN_SLOT * BROADCAST):
             self._send(Packet(BROADCAST, protocol.PING), answer * BROADCAST)
@@ -120,12 +214,11 @@ class DynamixelBus(ServoBus):
         }
 
     def read_bytes(self, servo: int, register: Register) -> bytes:
+        """Return the bytes of a register. Raises NoAnswer, Refused, BusLost."""
         return self._ask(Packet(servo, protocol.READ, _place(register)), register.size)
 
-    def write_bytes(self, servo: int, register: Register, data: bytes) -> None:
-        self._ask(Packet(servo, protocol.WRITE, word(register.address, 2) + data), 0)
-
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
+        """Write a signed value to each servo, without an answer. Raises BusLost."""
         goals = b"".join(
             bytes([servo]) + word(value, register.size) for servo, value in values.items()
         )
@@ -134,7 +227,10 @@ class DynamixelBus(ServoBus):
             self.port.send(packet.encode())
 
     def sync_read(self, register: Register, servos: Sequence[int], fast: bool) -> dict[int, bytes]:
-        """See `ServoBus`; fast: Fast Sync Read."""
+        """Return id → bytes of the servos that answered. Raises BusLost.
+
+        fast: Fast Sync Read, one packet for all, which one silent servo spoils.
+        """
         size, count = register.size, len(servos)
         code = protocol.FAST_SYNC_READ if fast else protocol.SYNC_READ
         expected = FAST_HEAD + count * (size + 4) if fast else count * (size + EMPTY_STATUS)
@@ -144,6 +240,7 @@ class DynamixelBus(ServoBus):
             return read(size, set(servos))
 
     def reboot(self, servo: int) -> None:
+        """Restart a servo. Raises NoAnswer, BusLost."""
         with suppress(Refused):
             self._ask(Packet(servo, protocol.REBOOT), 0)
         self.alerts.discard(servo)
@@ -224,6 +321,16 @@ class DynamixelBus(ServoBus):
         (self.alerts.add if error & ALERT else self.alerts.discard)(servo)
 
 
+def tried(call: Callable[..., T], *arguments: object) -> T:
+    """Return call(*arguments); repeat it when the answer is missing. Raises NoAnswer."""
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return call(*arguments)
+        except NoAnswer:
+            continue
+    return call(*arguments)
+
+
 def _parts(packet: Packet) -> tuple[int, int, bytes]:
     """Return id, error and data of a status packet."""
     return packet.id, packet.parameters[0], packet.parameters[1:]
@@ -231,3 +338,12 @@ def _parts(packet: Packet) -> tuple[int, int, bytes]:
 
 def _place(register: Register) -> bytes:
     return word(register.address, 2) + word(register.size, 2)
+
+
+def _reason(error: Exception) -> str:
+    number = error.args[0] if isinstance(error, termios.error) else getattr(error, "errno", None)
+    if number == errno.ENOENT:
+        return "does not exist"
+    if number == errno.EACCES:
+        return "no permission; add the user to the group dialout"
+    return os.strerror(number) if isinstance(number, int) else " ".join(str(error).split())

@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 
 from uam_sim_bridge.devices import INSTALL
-from uam_sim_bridge.devices.servo_bus import Register
 
 FIRST_RAM = 64  # addresses below are EEPROM: written with torque off only
 BAUD_RATES = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000)  # by register value
@@ -46,6 +45,23 @@ VOLTAGE_UNIT = 0.1  # [V]
 
 class ControlTableError(ValueError):
     """A model without control table; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Register:
+    """One entry of a servo's table: address and size in bytes."""
+
+    address: int
+    size: int
+
+    @property
+    def end(self) -> int:
+        """First address behind the entry."""
+        return self.address + self.size
+
+    def of(self, data: bytes, start: int) -> bytes:
+        """Return its bytes in `data`, which begin at the address `start`."""
+        return data[self.address - start : self.end - start]
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,12 @@ from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
 from uam_sim_bridge.devices.dynamixel import startup
 from uam_sim_bridge.devices.dynamixel.budget import GRIPPER_GOAL, Budget, budget
-from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus
+from uam_sim_bridge.devices.dynamixel.bus import BusLost, DynamixelBus, NoAnswer, Refused, tried
 from uam_sim_bridge.devices.dynamixel.chain import GRIPPER, ArmChain, ArmError, ServoDescription
-from uam_sim_bridge.devices.dynamixel.goals import Command, goal_current, goal_position
 from uam_sim_bridge.devices.dynamixel.health import CycleMeter, ServoHealth
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.dynamixel.upkeep import Upkeep
 from uam_sim_bridge.devices.serial.serial_port import SerialPort, advice, latency_timer
-from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, tried
 
 STATE = (names.PRESENT_POSITION, names.PRESENT_VELOCITY, names.PRESENT_CURRENT)
 START_ANSWER = 0.3  # [s] for each answer before the first cycle: the computer is busy then
@@ -46,6 +44,15 @@ class Reading:
     velocity: np.ndarray
     effort: np.ndarray
     grip: np.ndarray
+
+
+@dataclass(frozen=True)
+class Command:
+    """Efforts (n,) [N m] or goals (n,) [rad], desired velocities (n,) [rad/s], time [s]."""
+
+    values: np.ndarray
+    velocity: np.ndarray
+    time: float
 
 
 class ArmDriver:
@@ -68,7 +75,7 @@ class ArmDriver:
         port: SerialPort | None = None,
     ) -> None:
         """servo_mode: of the vehicle's `servos`; control_period [s]; position_p_gain: of position
-        mode, register value; clock: seconds; port: see `ServoBus`. Raises ArmError."""
+        mode, register value; clock: seconds; port: see `DynamixelBus`. Raises ArmError."""
         self.chain, self.parameters = chain, parameters
         self.rate = parameters.rate or 1.0 / control_period  # [Hz]
         self.in_position_mode = servo_mode == POSITION_SERVO
@@ -339,3 +346,41 @@ def _common_span(chain: ArmChain) -> names.Register:
         models = ", ".join(sorted({servo.table.model for servo in chain.servos}))
         raise ArmError(f"{chain.device}: {models}: control tables differ, one chain needs one kind")
     return spans.pop()
+
+
+def friction_torque(coulomb: float, viscous: float, velocity: float, speed: float) -> float:
+    """Return the friction torque [N m] at a desired velocity [rad/s].
+
+    coulomb [N m]; viscous [N m s/rad]; speed [rad/s]: width of the smooth sign, tanh(velocity /
+    speed), which has no step when the desired velocity changes its sign.
+    """
+    return coulomb * math.tanh(velocity / speed) + viscous * velocity
+
+
+def goal_current(
+    servo: ServoDescription,
+    effort: float,
+    velocity: float,
+    angle: float,
+    parameters: ArmDriverParameters,
+) -> int:
+    """Return the register Goal Current of a joint.
+
+    effort [N m]; velocity [rad/s]: desired; angle [rad]: measured. An effort that drives further
+    into a limit of the angle is removed.
+    """
+    if parameters.friction_compensation:
+        effort += friction_torque(servo.coulomb, servo.viscous, velocity, parameters.friction_speed)
+    if (angle >= servo.high and effort > 0.0) or (angle <= servo.low and effort < 0.0):
+        return 0
+    return servo.current(effort)
+
+
+def goal_position(servo: ServoDescription, goal: float, turns: int) -> int | None:
+    """Return the register Goal Position of a goal [rad] within the limits; None for NaN.
+
+    turns [counts]: see `ServoDescription.turned`.
+    """
+    if math.isnan(goal):
+        return None
+    return servo.counts(min(max(goal, servo.low), servo.high)) - turns

@@ -58,6 +58,11 @@ class Packet:
         return packet + crc16(packet).to_bytes(2, "little")
 
 
+def word(value: int, size: int) -> bytes:
+    """Return a signed or unsigned value as `size` bytes, the lowest first."""
+    return (value & ((1 << 8 * size) - 1)).to_bytes(size, "little")
+
+
 def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
     """Return the bytes of a status packet."""
     return Packet(servo, STATUS, bytes([error]) + parameters).encode()

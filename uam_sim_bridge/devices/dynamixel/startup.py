@@ -10,9 +10,9 @@ from itertools import permutations, product
 
 from uam_control.vehicle import POSITION_SERVO
 from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel.bus import DynamixelBus, NoAnswer, Refused, tried
 from uam_sim_bridge.devices.dynamixel.chain import SPEEDS, ArmChain, ArmError, ServoDescription
 from uam_sim_bridge.devices.dynamixel.control_table import MODE_NAMES, model_name
-from uam_sim_bridge.devices.servo_bus import NoAnswer, Refused, ServoBus, tried
 
 FAST_FIRMWARE = 45  # first one with Fast Sync Read
 DRIVE_MODE_FORBIDDEN = {0: "reverse direction", 3: "torque on by a goal"}  # bits
@@ -24,7 +24,7 @@ def required_mode(servo_mode: str) -> int:
     return names.POSITION_MODE if servo_mode == POSITION_SERVO else names.CURRENT_MODE
 
 
-def check_servos(bus: ServoBus, chain: ArmChain) -> None:
+def check_servos(bus: DynamixelBus, chain: ArmChain) -> None:
     """Check that every id answers with the described model.
 
     Raises ArmError with every problem, separated by semicolons; BusLost.
@@ -61,7 +61,7 @@ def check_servos(bus: ServoBus, chain: ArmChain) -> None:
         raise ArmError(f"{chain.device}: {'; '.join(problems)}")
 
 
-def _other_baud_rates(bus: ServoBus, chain: ArmChain) -> str:
+def _other_baud_rates(bus: DynamixelBus, chain: ArmChain) -> str:
     """Return at which baud rates the described ids answer, "" if nowhere."""
     texts = []
     for speed in SPEEDS:
@@ -78,7 +78,7 @@ def _other_baud_rates(bus: ServoBus, chain: ArmChain) -> str:
     return ", ".join(texts)
 
 
-def check_settings(bus: ServoBus, chain: ArmChain, mode: int, write: bool) -> list[str]:
+def check_settings(bus: DynamixelBus, chain: ArmChain, mode: int, write: bool) -> list[str]:
     """Check the settings of every servo, torque off; return remarks, one line each.
 
     write: change those that differ and remark it; else they are problems. Raises ArmError with
@@ -135,7 +135,7 @@ def _shown(name: str, value: int) -> str:
     return str(value)
 
 
-def without_fast_sync_read(bus: ServoBus, chain: ArmChain) -> list[str]:
+def without_fast_sync_read(bus: DynamixelBus, chain: ArmChain) -> list[str]:
     """Return one line per servo whose firmware has no Fast Sync Read."""
     found = []
     for servo in chain.servos:

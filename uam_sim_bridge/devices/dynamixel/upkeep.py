@@ -9,11 +9,11 @@ import math
 from itertools import cycle, product
 
 from uam_sim_bridge.devices.dynamixel import control_table as names
+from uam_sim_bridge.devices.dynamixel.bus import BusLost, DynamixelBus, NoAnswer, Refused, tried
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
 from uam_sim_bridge.devices.dynamixel.control_table import WATCHDOG_TRIPPED, WATCHDOG_UNIT
 from uam_sim_bridge.devices.dynamixel.health import ServoHealth, hardware_errors
 from uam_sim_bridge.devices.dynamixel.parameters import HOLD, ArmDriverParameters
-from uam_sim_bridge.devices.servo_bus import BusLost, NoAnswer, Refused, ServoBus, tried
 
 TORQUE, SUPPLY, WATCHDOG = "torque", "supply", "watchdog"
 # one of them of one servo per slow read
@@ -32,7 +32,7 @@ class Upkeep:
 
     def __init__(
         self,
-        bus: ServoBus,
+        bus: DynamixelBus,
         chain: ArmChain,
         parameters: ArmDriverParameters,
         position_p_gain: float | None,

@@ -13,11 +13,12 @@ from uam_sim_bridge.devices.dynamixel.control_table import (
     FIRST_RAM,
     WATCHDOG_TRIPPED,
     WATCHDOG_UNIT,
+    Register,
     control_table,
 )
 from uam_sim_bridge.devices.dynamixel.emulated.shafts import Drive, Shaft
 from uam_sim_bridge.devices.dynamixel.health import ERRORS
-from uam_sim_bridge.devices.servo_bus import Register, word
+from uam_sim_bridge.devices.dynamixel.protocol import word
 
 READ_ONLY = (
     *(names.MODEL_NUMBER, "Model Information", names.FIRMWARE, names.HARDWARE_ERROR),
