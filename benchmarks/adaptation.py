@@ -25,9 +25,9 @@ from adapting.description import STUDY, Study, load_study
 from adapting.run import PROPOSED, SHOWN, Runner, margins
 from adapting.search import PATIENCE, search
 
+from uam_control.settings.atomic import write_rows, write_text
 from uam_lab.experiments.tuning.front import convergence
 from uam_lab.experiments.workers.place import Workplace, cores
-from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import make_folder, read_json, versions, write_json
 from uam_lab.records.results.terminal import say
 from uam_lab.records.results.timeseries import SUBSYSTEMS

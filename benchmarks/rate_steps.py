@@ -19,10 +19,10 @@ from px4_steps.hover_flight import HoverFlight, NotFlown
 from px4_steps.rate_experiment import AXES, experiment, responses
 from px4_steps.step_response import distance, figures
 
+from uam_control.settings.atomic import replacing, write_rows, write_text
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.flights.processes.node_environment import environment
 from uam_lab.flights.processes.processes import NodeFailed, Processes
-from uam_lab.records.results.atomic import replacing, write_rows, write_text
 from uam_lab.records.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_lab.report.figures import style
 from uam_sim_bridge.ports import PortError, Reservation

@@ -12,6 +12,7 @@ from uam_lab.flights.ros import supervise
 from uam_lab.preflight.doctor import machine, rendering
 from uam_lab.preflight.doctor.check_process import TOO_LATE, Said
 from uam_lab.preflight.doctor.finding import Verdict
+from uam_lab.report.video import opengl
 
 OK, WARN, FAIL = Verdict
 
@@ -53,7 +54,7 @@ def test_an_empty_picture_is_a_warning():
 
 
 def test_without_opengl_flights_still_work(monkeypatch):
-    monkeypatch.setattr(rendering, "PLATFORM", "no-such-platform")
+    monkeypatch.setattr(opengl, "FALLBACKS", ("no-such-platform",))
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     (found,) = rendering.checks()
     assert found.verdict is WARN

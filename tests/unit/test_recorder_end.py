@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -30,5 +31,6 @@ def test_the_statistics_are_written_without_the_metadata(tmp_path):
     _complete(node, Recording(), str(file))
     assert json.loads(file.read_text())["ended"] == Recording.ended
     _complete(node, Recording(), "/dev/full")
+    assert Path("/dev/full").is_char_device()
     metadata = "metadata.yaml cannot be written: No space left on device"
     assert said == [metadata, metadata, "/dev/full cannot be written: No space left on device"]

@@ -1,6 +1,7 @@
 """Snapshots and video: content, times, and behaviour without a renderer."""
 
 import json
+import os
 import subprocess
 
 import imageio_ffmpeg
@@ -13,7 +14,7 @@ from uam_lab.report import build
 from uam_lab.report.build import build_report
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.path_figure import Poses
-from uam_lab.report.video import flight_pictures, flight_video
+from uam_lab.report.video import flight_pictures, flight_video, opengl
 
 
 def cut(series, end):
@@ -69,7 +70,7 @@ def test_a_video_has_a_limited_length_and_an_integer_speed_factor(flight):
 def test_without_a_renderer_the_report_is_written_with_advice(flight_folder, monkeypatch):
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
-    monkeypatch.setattr(flight_video, "PLATFORM", "glfw")
+    monkeypatch.setattr(opengl, "FALLBACKS", ("glfw",))
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(figures, "FIGURES", {})
     report = build_report(flight_folder)
@@ -78,6 +79,16 @@ def test_without_a_renderer_the_report_is_written_with_advice(flight_folder, mon
     html = report.page.read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in html
     assert "<video" not in html
+
+
+def test_a_platform_of_the_user_that_does_not_draw_is_followed_by_the_others(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    assert opengl.platforms() == ("osmesa", "egl")
+    monkeypatch.setenv("MUJOCO_GL", "")
+    assert opengl.platforms() == ("egl", "osmesa")
+    opengl.choose()
+    assert opengl.environment("glfw")["MUJOCO_GL"] == "glfw"
+    assert os.environ["MUJOCO_GL"] == "egl"
 
 
 def rendered_in(folder, progress=lambda text: None):

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import yaml
 
+from uam_control.settings import atomic
 from uam_lab.cli import parser
-from uam_lab.records.results import atomic, result_folder
+from uam_lab.records.results import result_folder
 from uam_lab.records.results.result_folder import ResultFolder, ResultFolderError, make_folder
 
 NOON = datetime(2026, 3, 1, 12, 0, 5)
@@ -164,6 +165,15 @@ def test_a_full_disk_is_named_with_the_file_and_is_no_wrong_use(here, capsys):
     )
     missing = here / "no such" / "metrics.json"
     assert parser.run(Namespace(command="fly", run=lambda _: atomic.write_text(missing, ""))) == 2
+
+
+def test_a_device_is_written_and_not_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with os.fdopen(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as reader:
+        atomic.write_text(pipe, "text")
+        assert reader.read() == "text"
+    assert pipe.is_fifo()
 
 
 CLAIMS = """

@@ -158,6 +158,17 @@ def test_nodes_of_one_process_count_no_moment_twice(tmp_path, clock):
     assert stages == [[100], [10]]
 
 
+def test_an_interrupted_end_leaves_no_half_file(tmp_path, monkeypatch):
+    def interrupted(file, **arrays):
+        file.write(b"PK")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        TickTimes(tmp_path / "times.npz", 4).close()
+    assert not list(tmp_path.iterdir())
+
+
 def test_without_a_file_nothing_is_measured():
     times = tick_times(TickTimesParameters())
     assert type(times) is NoTickTimes

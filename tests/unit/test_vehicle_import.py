@@ -19,9 +19,8 @@ from uam_control.arm.hand import hinge_angles
 from uam_control.settings.configuration import path
 from uam_control.vehicle import chain_of, load_description
 from uam_lab.cli.parser import parsed, run
-from uam_lab.importing import importer
+from uam_lab.importing import importer, picture
 from uam_lab.importing.answers import Answers, read_answers
-from uam_lab.importing.picture import bounds
 from uam_lab.importing.source import ImportRefused
 from uam_lab.importing.structure import Chosen
 from uam_sim_bridge.plant import Vehicle
@@ -98,7 +97,7 @@ def test_an_arm_whose_meshes_are_missing_is_above_the_feet_and_shown(tmp_path):
     assert [model.geom_type[g] for g in bars] == [mujoco.mjtGeom.mjGEOM_CAPSULE]
     ends = here.joint(joints[0]).xanchor, here.joint(joints[1]).xanchor
     assert here.geom_xpos[bars[0]] == pytest.approx((ends[0] + ends[1]) / 2, abs=1e-6)
-    middle, radius = bounds(model, here)
+    middle, radius = picture.bounds(model, here)
     assert np.linalg.norm(here.body("magnet").xpos - middle) < radius < 1.0
 
 
@@ -427,3 +426,15 @@ def test_the_command_writes_files_and_a_picture_once(tmp_path, capsys):
     assert yaml.safe_load((out / "mine.yaml").read_text())["model"] == "mine.xml"
     assert run(parsed(words)) == 2
     assert "exists; --overwrite" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [((), "required"), (("s500arm", "a.png"), "unknown vehicle")],
+)
+def test_a_picture_is_refused_in_one_line(monkeypatch, capsys, given, said):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr("sys.argv", ["picture", *given])
+    with pytest.raises(SystemExit) as ended:
+        picture.main()
+    assert ended.value.code == 2 and said in capsys.readouterr().err.splitlines()[-1]

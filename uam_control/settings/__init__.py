@@ -1,1 +1,1 @@
-"""Parameter sets, YAML files and the location of config/."""
+"""Parameter sets, YAML files, the location of config/, and atomic writing."""

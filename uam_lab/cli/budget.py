@@ -22,6 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from uam_control.mission import load_scenario
+from uam_control.settings.atomic import write_text
 from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.experiments.budget.path import NoTicks
 from uam_lab.experiments.budget.shuttle import JOINTS, shuttle
@@ -32,7 +33,6 @@ from uam_lab.flights.flight_settings import FlightSettings, require_ros
 from uam_lab.flights.library.flight_result import FlightFailed
 from uam_lab.flights.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.flights.progress import Progress
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import Terminal, say
 

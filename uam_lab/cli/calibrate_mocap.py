@@ -25,11 +25,11 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from uam_control.settings.atomic import write_text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import Command, number, path
 from uam_lab.flights.vehicle.lab import LabError
 from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
-from uam_lab.records.results.atomic import replacing, write_text
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.mocap.mocap_parameters import (
     LIBRARY,
@@ -157,10 +157,9 @@ def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     finally:
         source.close()
         if options.save and found:
-            with replacing(options.save) as temporary:
-                measurement.write_poses(
-                    temporary, [pose for poses in found.values() for pose in poses]
-                )
+            measurement.write_poses(
+                options.save, [pose for poses in found.values() for pose in poses]
+            )
     return found
 
 

@@ -14,9 +14,9 @@ Results in --out: tables.md, flights.parquet. Deviations from the published task
 
 import argparse
 
+from uam_control.settings.atomic import write_text
 from uam_lab.cli.command import Command, count, place_of
 from uam_lab.flights.conclude import command_line
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
 

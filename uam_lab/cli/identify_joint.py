@@ -22,10 +22,10 @@ import numpy as np
 
 from uam_control.arm.chain import carrying
 from uam_control.arm.kinematics import gravity_torque
+from uam_control.settings.atomic import replacing, write_text
 from uam_control.vehicle import chain_of
 from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, number
-from uam_lab.records.results.atomic import replacing, write_text
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.dynamixel.chain import ArmError
 from uam_sim_bridge.devices.dynamixel.excitation import ExcitationParameters

@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from uam_control.settings.atomic import write_text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.importing import geometry, mjcf_file, numbers, urdf_file
 from uam_lab.importing.answers import ASSUMED, DERIVED, Answers, Told
@@ -17,7 +18,6 @@ from uam_lab.importing.mjcf_text import MjcfText
 from uam_lab.importing.source import ImportRefused, Source, kind_of, tree
 from uam_lab.importing.standing import Stance, stand
 from uam_lab.importing.structure import BASE, Chosen, Parts, find
-from uam_lab.records.results.atomic import write_text
 from uam_sim_bridge.plant import Vehicle
 
 SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone

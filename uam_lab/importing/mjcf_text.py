@@ -8,11 +8,11 @@ import numpy as np
 from lxml import etree
 
 from uam_control.settings import configuration
+from uam_control.settings.atomic import copy, write_text
 from uam_lab.importing import geometry
 from uam_lab.importing.source import XmlElement
 from uam_lab.importing.standing import Stance
 from uam_lab.importing.structure import OWN, Parts
-from uam_lab.records.results.atomic import copy, write_text
 
 INCLUDED = ("world.xml", "sensors.xml", "magnet.xml")
 XM430 = 3.0  # [N m] its stall torque; its dynamics are those of parts/world.xml

@@ -5,7 +5,7 @@ MuJoCo reads MUJOCO_GL at import, so `draw` does it in a process of its own.
 
 from __future__ import annotations
 
-import os
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from uam_lab.records.results.atomic import replacing
+from uam_control.settings.atomic import replacing
+from uam_lab.report.video import opengl
 
 if TYPE_CHECKING:
     import mujoco
 
-PLATFORMS = ("egl", "osmesa")  # tried where MUJOCO_GL names none
 SIZE = (480, 720)  # height, width [pixels]
 LIMIT = 60.0  # [s]
 AWAY = 2.9  # distance of the camera, per radius of the vehicle: all of it is in the picture
@@ -27,13 +27,12 @@ NEAREST = 0.1  # what is nearer is not drawn, per distance of the camera
 
 def draw(vehicle: Path, picture: Path) -> str:
     """Write a picture of the vehicle with its arm stowed; return why there is none, "" if it is."""
-    given = os.environ.get("MUJOCO_GL")
-    for platform in (given,) if given else PLATFORMS:
+    for platform in opengl.platforms():
         command = [sys.executable, "-m", "uam_lab.importing.picture", str(vehicle), str(picture)]
         try:
             done = subprocess.run(
                 command,
-                env=os.environ | {"MUJOCO_GL": platform},
+                env=opengl.environment(platform),
                 capture_output=True,
                 timeout=LIMIT,
                 check=False,
@@ -42,7 +41,7 @@ def draw(vehicle: Path, picture: Path) -> str:
             return f"the renderer {platform} took more than {LIMIT:g} s"
         if done.returncode == 0:
             return ""
-    return f"no renderer: {', '.join(PLATFORMS)} failed; uam doctor says why"
+    return f"no renderer: {', '.join(opengl.platforms())} failed; uam doctor says why"
 
 
 def bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, float]:
@@ -53,9 +52,21 @@ def bounds(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, floa
     return middle, float((np.linalg.norm(here - middle, axis=1) + reach[:, 0]).max())
 
 
-def main(name: str, file: str) -> None:
-    """Write the picture in this process."""
-    os.environ.setdefault("MUJOCO_GL", PLATFORMS[0])
+def main() -> None:
+    """Run the command line, see the docstring of the module."""
+    parser = argparse.ArgumentParser(prog="python -m uam_lab.importing.picture")
+    parser.add_argument("vehicle", metavar="NAME|FILE")
+    parser.add_argument("picture", type=Path, metavar="picture.png")
+    options = parser.parse_args()
+    try:
+        draw_here(options.vehicle, options.picture)
+    except (ValueError, OSError) as error:
+        parser.error(str(error))
+
+
+def draw_here(name: str, file: Path) -> None:
+    """Write the picture in this process. Raises ValueError for a bad vehicle, OSError."""
+    opengl.choose()
     import mujoco
     from PIL import Image
 
@@ -69,9 +80,9 @@ def main(name: str, file: str) -> None:
     plant.model.vis.map.znear = NEAREST * camera.distance / plant.model.stat.extent
     with mujoco.Renderer(plant.model, *SIZE) as renderer:
         renderer.update_scene(plant.data, camera)
-        with replacing(Path(file)) as temporary:
+        with replacing(file) as temporary:
             Image.fromarray(renderer.render()).save(temporary)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

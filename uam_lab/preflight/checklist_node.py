@@ -4,7 +4,6 @@ It reads the vehicle, asks a person for motions, and publishes the result on /ua
 mission starts with `require_checklist` only when all items have passed.
 """
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,6 @@ from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import Box, Observation
 from uam_lab.preflight.checklist.step import Step, StepState
 from uam_lab.preflight.checklist_feed import Feed
-from uam_lab.records.results.atomic import write_text
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, checklist_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
@@ -35,6 +33,7 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.answering import ServingExecutor, offer
 from uam_msgs_py.node.base_node import StopSignal, run_with
 from uam_msgs_py.node.namespace import label
+from uam_msgs_py.node.node_files import write_json
 from uam_msgs_py.node.node_parameters import NodeParameters, plain, refuse_unknown
 from uam_msgs_py.node.rightful import rightful_nodes
 
@@ -238,10 +237,7 @@ class ChecklistNode:
             return
         self._recorded = count
         content = record(self._checklist, self._limits.current, time.time() - self._feed.now)
-        try:
-            write_text(Path(file), json.dumps(content, indent=1) + "\n")
-        except OSError as error:
-            self._node.get_logger().error(f"{file} cannot be written: {error.strerror}")
+        write_json(self._node, file, content)
 
 
 def main() -> int:

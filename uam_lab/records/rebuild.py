@@ -6,12 +6,12 @@ from typing import Any
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import configuration
+from uam_control.settings.atomic import copy, write_text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.records.recording import log_facts
 from uam_lab.records.recording.log_reader import read_flight
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results import timeseries
-from uam_lab.records.results.atomic import copy, write_text
 from uam_lab.records.results.outcome import complete
 from uam_lab.records.results.result_folder import (
     LOG,

@@ -35,6 +35,7 @@ from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, run_with
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import label
+from uam_msgs_py.node.node_files import write_json
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 
@@ -151,13 +152,9 @@ def _complete(node: Node, recording: TopicRecorder, statistics: str) -> None:
         log.error(f"metadata.yaml cannot be written: {error.strerror}")
     if recording.lost:
         log.warning(f"messages were lost: {_losses(recording)}")
-    if statistics:
-        lost, written = recording.lost, recording.log
-        summary = {"messages": written.counts, "lost": lost, "ended": written.ended}
-        try:
-            Path(statistics).write_text(json.dumps(summary, indent=1), encoding="utf-8")
-        except OSError as error:
-            log.error(f"{statistics} cannot be written: {error.strerror}")
+    lost, written = recording.lost, recording.log
+    summary = {"messages": written.counts, "lost": lost, "ended": written.ended}
+    write_json(node, statistics, summary)
 
 
 def main() -> int:

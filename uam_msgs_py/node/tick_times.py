@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from rclpy.publisher import Publisher
 
+from uam_control.settings.atomic import replacing
 from uam_control.settings.process_parameters import TickTimesParameters
 from uam_msgs_py.messages import topics
 
@@ -142,7 +143,7 @@ class TickTimes(NoTickTimes):
         kept = len(self._rows)
         first = self._count % kept if self._count > kept else 0
         rows = np.roll(self._rows, -first, axis=0)[: min(self._count, kept)]
-        with self._file.open("wb") as file:  # np.save adds a suffix to a name
+        with replacing(self._file) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, columns=np.array(COLUMNS), rows=rows)
 
 

@@ -7,12 +7,10 @@ of the checklist, which its person does.
 """
 
 import gc
-import json
 import math
 import sys
 import time
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ from std_srvs.srv import Trigger
 
 from uam_control.coordinates import CHI
 from uam_control.mission.time_limit import FlightEnd
+from uam_control.settings.atomic import write_text
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
@@ -31,6 +30,7 @@ from uam_msgs_py.node import polling
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.namespace import frame
+from uam_msgs_py.node.node_files import write_json
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
@@ -147,7 +147,7 @@ class Rehearsal:
         self._mission = MissionStatus()
         self._person = Person(vehicle.joint_names, self.lab.folded)
         self._list, self._asked = ChecklistState(), -math.inf
-        (p.places / READY).write_text(f"{self.lab.mocap.port}\n", encoding="utf-8")
+        write_text(p.places / READY, f"{self.lab.mocap.port}\n")
 
     def await_autopilot(self) -> None:
         """Wait until the autopilot is connected, or a signal."""
@@ -270,9 +270,7 @@ def _rehearse(node: TunableNode, stop: StopSignal) -> int:
         rehearsal.run()
         return 0
     finally:
-        if parameters.statistics:
-            text = json.dumps(rehearsal.report())
-            Path(parameters.statistics).write_text(text, encoding="utf-8")
+        write_json(node, parameters.statistics, rehearsal.report())
         rehearsal.close()
 
 

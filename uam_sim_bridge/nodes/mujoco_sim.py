@@ -22,11 +22,9 @@ realtime  Ticks begin at absolute deadlines of the wall clock, one control perio
 """
 
 import gc
-import json
 import math
 import time
 from functools import partial
-from pathlib import Path
 
 from std_srvs.srv import Trigger
 
@@ -39,6 +37,7 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.executor import LeanExecutor
+from uam_msgs_py.node.node_files import write_json
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
@@ -401,9 +400,7 @@ def _simulate(node: TunableNode, stop: StopSignal) -> int:
         return NOT_READY if isinstance(error, NotReady) else 1
     finally:
         simulator.close()
-        if statistics := options.parameters.statistics:
-            text = json.dumps(simulator.report().to_mapping())
-            Path(statistics).write_text(text, encoding="utf-8")
+        write_json(node, options.parameters.statistics, simulator.report().to_mapping())
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from uam_control.settings.atomic import write_text
 from uam_lab.experiments.budget.flown import Budget
 from uam_lab.experiments.budget.path import SEGMENTS
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
 from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style

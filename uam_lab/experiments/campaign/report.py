@@ -13,12 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uam_control.coordinates import BASE_COORDINATES, POSITION
+from uam_control.settings.atomic import write_text
 from uam_lab.experiments.campaign.statistics import Bin, percentile, share, sliced
 from uam_lab.experiments.campaign.variations import common
 from uam_lab.experiments.trials.outcome import COMPLETED, OUTCOMES, counts
 from uam_lab.experiments.trials.trial import TrialResult
 from uam_lab.records.results import templates
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import versions, write_json
 from uam_lab.report.figures import style
 

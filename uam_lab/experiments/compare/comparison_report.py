@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from uam_control.profiles.profile import Profile
+from uam_control.settings.atomic import write_text
 from uam_lab.experiments.compare import plan, tables
 from uam_lab.experiments.compare.modularity import ModularityEvidence
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import templates, timeseries
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import versions, write_json
 from uam_lab.report.figures import figures, style
 from uam_lab.report.figures.panels import DrawnFlight

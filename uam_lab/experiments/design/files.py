@@ -5,12 +5,12 @@ from pathlib import Path
 
 import yaml
 
+from uam_control.settings.atomic import write_text
 from uam_control.settings.parameter_file import as_text
 from uam_control.vehicle import AUTOPILOT_FILE, PROFILE_FILE, VehicleDescription, designed
 from uam_lab.experiments.design.criteria import DesignError
 from uam_lab.experiments.design.search import RATES, Design
 from uam_lab.experiments.margins import report
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style
 

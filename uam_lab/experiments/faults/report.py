@@ -8,6 +8,7 @@ from pathlib import Path
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from uam_control.settings.atomic import write_rows, write_text
 from uam_lab.experiments.faults.matrix import NOMINAL, Matrix
 from uam_lab.experiments.faults.trial import FaultResult
 from uam_lab.experiments.trials.outcome import (
@@ -21,7 +22,6 @@ from uam_lab.experiments.trials.outcome import (
     counts,
 )
 from uam_lab.records.results import templates
-from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.records.results.result_folder import versions, write_json
 from uam_lab.report.figures import style
 

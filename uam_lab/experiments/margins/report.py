@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.settings.atomic import write_text
 from uam_lab.experiments.margins.cases import Case, smallest_delay
 from uam_lab.experiments.margins.loops import GROWTH, Analysis, GrowingMode, step_response
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import write_json
 from uam_lab.records.results.templates import markdown_table, shown
 from uam_lab.report.figures import style

@@ -14,6 +14,7 @@ from typing import Any, Self
 import pyarrow.parquet as pq
 from pyarrow.csv import write_csv
 
+from uam_control.settings.atomic import replacing
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.carried import arrived, carried, inputs
 from uam_lab.experiments.trials.counting import Counting
@@ -22,7 +23,6 @@ from uam_lab.experiments.trials.trial import Trial, measure
 from uam_lab.experiments.workers.place import Workplace
 from uam_lab.experiments.workers.workers import workers
 from uam_lab.flights.direct.warm_up import prepare
-from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.terminal import say
 
 Work = Callable[[Any], Any]

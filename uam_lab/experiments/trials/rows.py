@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from uam_lab.records.results.atomic import replacing
+from uam_control.settings.atomic import replacing
 from uam_lab.records.results.metrics import plain
 
 COLUMNS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from optuna.trial import FrozenTrial
 
+from uam_control.settings.atomic import write_rows, write_text
 from uam_control.settings.parameter_file import as_text
 from uam_lab.experiments.tuning.front import chosen, front, hypervolumes
 from uam_lab.experiments.tuning.search import DONE, evaluated_start
 from uam_lab.experiments.tuning.space import Space
-from uam_lab.records.results.atomic import write_rows, write_text
 from uam_lab.report.figures import style
 
 

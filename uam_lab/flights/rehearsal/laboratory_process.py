@@ -14,13 +14,13 @@ import yaml
 from uam_control.mission.time_limit import time_limit
 from uam_control.offboard.autopilot_magnet import GRIPPER
 from uam_control.settings import configuration, yaml_file
+from uam_control.settings.atomic import write_text
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
 from uam_lab.flights.vehicle.lab import GPIO, Lab, LabError
 from uam_lab.flights.vehicle.lab_file import load_lab
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE
-from uam_lab.records.results.atomic import write_text
 from uam_sim_bridge.devices.mocap.calibration import FOLDER as CALIBRATIONS
 from uam_sim_bridge.faults import CABLE
 from uam_sim_bridge.laboratory.laboratory import BUS_DEVICE, SERIAL_FAR, SERIAL_NEAR, USB

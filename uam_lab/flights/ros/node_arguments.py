@@ -8,6 +8,7 @@ import yaml
 
 from uam_control.mission.time_limit import time_limit
 from uam_control.profiles.profile import servo_mode
+from uam_control.settings.atomic import write_text
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.cockpit import page_address
 from uam_lab.flights.conclude import settings_facts
@@ -15,7 +16,6 @@ from uam_lab.flights.flight_options import AUTOPILOT_IMU, BUILTIN
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.node_options import EVERY_NODE
 from uam_lab.records.recording import log_facts
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.result_folder import PX4_LOG, ResultFolder, as_json, versions
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring

@@ -10,6 +10,7 @@ import time
 from collections.abc import Collection, Iterable
 
 from uam_control.profiles.profile import CONTROLLERS
+from uam_control.settings.atomic import copy
 from uam_control.supervision import State
 from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import COCKPIT
@@ -23,7 +24,6 @@ from uam_lab.flights.ros.supervise import Course, FlightRun
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
 from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.records.results.atomic import copy
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics

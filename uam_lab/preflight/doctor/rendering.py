@@ -3,14 +3,14 @@
 A child process renders the frame: MUJOCO_GL=egl python -m uam_lab.preflight.doctor.rendering
 """
 
-import os
 import sys
 import time
 from collections.abc import Iterator
 
 from uam_lab.preflight.doctor.check_process import TOO_LATE, CheckProcess, Said, say
 from uam_lab.preflight.doctor.finding import Finding, ok, warn
-from uam_lab.report.video.flight_video import HOW_TO_GET_ONE, PLATFORM
+from uam_lab.report.video import opengl
+from uam_lab.report.video.flight_video import HOW_TO_GET_ONE
 
 MODULE = "uam_lab.preflight.doctor.rendering"
 HEIGHT, WIDTH = 240, 320
@@ -21,14 +21,14 @@ SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 def checks() -> Iterator[Finding]:
     """Yield the finding for the first platform that renders, in the order of the report."""
-    problem, chosen = "", os.environ.get("MUJOCO_GL", "")
-    for platform in dict.fromkeys(filter(None, (chosen, PLATFORM))):
-        with CheckProcess(MODULE, environment={"MUJOCO_GL": platform}) as child:
+    problem = ""
+    for platform in opengl.platforms():
+        with CheckProcess(MODULE, environment={opengl.VARIABLE: platform}) as child:
             said = child.wait(PATIENCE)
         if "frame_s" in said.facts:
             yield drawn(platform, said)
             return
-        problem = problem or f"MUJOCO_GL={platform}: {said.problem}"
+        problem = problem or f"{opengl.VARIABLE}={platform}: {said.problem}"
     if TOO_LATE in problem:
         yield warn(
             "rendering",

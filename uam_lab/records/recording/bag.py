@@ -18,9 +18,9 @@ import yaml
 from rclpy.duration import Duration
 from rclpy.qos import QoSLivelinessPolicy, QoSProfile
 
+from uam_control.settings.atomic import write_text
 from uam_control.stamps import SECOND
 from uam_lab.records.recording.bounded_log import BoundedLog
-from uam_lab.records.results.atomic import write_text
 from uam_msgs_py.messages import tf_message
 
 METADATA = "metadata.yaml"

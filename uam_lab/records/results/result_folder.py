@@ -19,7 +19,7 @@ from typing import Any
 
 import yaml
 
-from uam_lab.records.results.atomic import replacing, write_text
+from uam_control.settings.atomic import replacing, write_text
 from uam_lab.records.results.metrics import plain
 
 _of_process: dict[Path, FolderClaim] = {}  # claims of commands, to the end of this process

@@ -26,9 +26,9 @@ from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.motion.flatness import Flyer
+from uam_control.settings.atomic import replacing
 from uam_control.vehicle import TWO_FINGER, VehicleDescription
 from uam_lab.records.results import hand_columns
-from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.hand_columns import TRUTH
 
 SUBSYSTEMS = ("position", "attitude", "arm")

@@ -18,8 +18,8 @@ from matplotlib.ticker import NullFormatter
 from uam_control.coordinates import coordinates
 from uam_control.laws import catalogue
 from uam_control.laws.law import GainGroup
+from uam_control.settings.atomic import write_text
 from uam_lab.records.results import metrics
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.phase_errors import GROUPS
 from uam_lab.records.results.timeseries import AXES, SUBSYSTEMS
 from uam_lab.report.facts import paper

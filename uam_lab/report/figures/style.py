@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from uam_lab.records.results.atomic import replacing
+from uam_control.settings.atomic import replacing
 
 INK = "#22303c"
 MUTED = "#74808b"

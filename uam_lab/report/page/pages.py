@@ -6,8 +6,8 @@ from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import ProfileError
+from uam_control.settings.atomic import write_text
 from uam_lab.records.results import templates
-from uam_lab.records.results.atomic import write_text
 from uam_lab.records.results.metrics import PASSED_ON, errors
 from uam_lab.records.results.result_folder import LOG, PX4_LOG, TABLE, read_json
 from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows

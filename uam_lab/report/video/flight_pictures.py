@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import uniform_filter1d
 
-from uam_lab.records.results.atomic import replacing
+from uam_control.settings.atomic import replacing
 from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures.panels import MARGIN_S
 from uam_lab.report.figures.path_figure import Poses

@@ -8,7 +8,6 @@ standard output, one line per step; a pipe holds all of them.
 """
 
 import argparse
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,15 +17,15 @@ from typing import Self
 
 import numpy as np
 
+from uam_control.settings.atomic import replacing
 from uam_lab.records.results import timeseries
-from uam_lab.records.results.atomic import replacing
 from uam_lab.records.results.result_folder import TABLE
 from uam_lab.records.results.timeseries import Series
+from uam_lab.report.video import opengl
 
 SNAPSHOT_SIZE = (1280, 720)
 CAPTION_PART = 0.11  # of the height; large enough for the strip
 SNAPSHOTS, STRIP, VIDEO = "snapshots", "snapshots.png", "flight.mp4"
-PLATFORM = "egl"  # needs neither screen nor GPU
 PROGRESS = "progress: "
 NO_RENDERER = 3  # exit status of the child
 HOW_TO_GET_ONE = (
@@ -54,14 +53,14 @@ class Rendering:
     def __init__(self, directory: Path, video: bool = True) -> None:
         """Start to render the flight in `directory` to `directory`/figures."""
         self._directory, self._video = directory, video
-        first, *self._further = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
+        first, *self._further = opengl.platforms()
         self._child = self._start(first)
 
     def _start(self, platform: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(self._directory)]
         return subprocess.Popen(
             command if self._video else [*command, "--no-video"],
-            env=os.environ | {"MUJOCO_GL": platform},
+            env=opengl.environment(platform),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -72,6 +71,7 @@ class Rendering:
     def result(self, progress: Callable[[str], None] = lambda text: None) -> Rendered:
         """Wait for the end; return the pictures. Missing OpenGL is no error."""
         status, last_line = self._wait(progress)
+        first_line = last_line
         for platform in self._further:
             if status != NO_RENDERER:
                 break
@@ -79,7 +79,7 @@ class Rendering:
             status, last_line = self._wait(progress)
         problem = ""
         if status == NO_RENDERER:
-            problem = f"{HOW_TO_GET_ONE} ({last_line[:120]})"
+            problem = f"{HOW_TO_GET_ONE} ({first_line[:120]})"
         elif status != 0:
             problem = f"rendering failed: {last_line or f'exit status {status}'}"
         return replace(existing(self._directory), problem=problem)
@@ -196,7 +196,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("directory", type=Path)
     parser.add_argument("--no-video", action="store_true")
     options = parser.parse_args(arguments)
-    os.environ.setdefault("MUJOCO_GL", PLATFORM)
+    opengl.choose()
 
     def report(text: str) -> None:
         print(PROGRESS + text, flush=True)

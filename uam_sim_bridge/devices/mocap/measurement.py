@@ -3,7 +3,6 @@
 Its poses come from the running system, or from a recording: CSV, in the tracker's axes.
 """
 
-import csv
 import math
 import time
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.settings.atomic import write_rows
 from uam_control.settings.csv_table import CsvTable
 from uam_control.stamps import SECOND
 from uam_sim_bridge.devices.mocap.frame import BodyPose, MocapError, MocapSource, unknown_body
@@ -139,12 +139,11 @@ def tracked_poses(source: MocapSource, body: str, duration: float) -> list[Timed
 
 def write_poses(file: Path, poses: Sequence[TimedPose]) -> None:
     """Write the poses; raises OSError."""
-    with file.open("w", newline="", encoding="utf-8") as out:
-        rows = csv.writer(out)
-        rows.writerow(COLUMNS)
-        for time, (position, quaternion) in poses:
-            numbers = *position, *quaternion
-            rows.writerow([f"{time:.6f}", *(f"{number:.9g}" for number in numbers)])
+    rows = (
+        [f"{time:.6f}", *(f"{number:.9g}" for number in (*position, *quaternion))]
+        for time, (position, quaternion) in poses
+    )
+    write_rows(file, COLUMNS, rows)
 
 
 def read_poses(file: Path) -> list[TimedPose]:

@@ -12,9 +12,13 @@ from pathlib import Path
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block raises no exception.
 
-    The temporary name keeps the suffix, because writers select their format by it. An OSError of a
-    write, which names no file (a full disk), is raised with `path`.
+    A device or a pipe (/dev/stdout) is written itself. The temporary name keeps the suffix, because
+    writers select their format by it. An OSError of a write, which names no file (a full disk), is
+    raised with `path`.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        yield path
+        return
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
