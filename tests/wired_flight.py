@@ -25,7 +25,7 @@ from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST, UdpPort
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
-from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
+from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 

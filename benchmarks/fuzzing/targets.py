@@ -139,8 +139,8 @@ class Bridge:
                 self._counts["arm requests"] += m.param1 == 1.0
                 require(self._armed_desired or m.param1 == 0.0, "arming requested without command")
         self._transport.sent.clear()
-        bounded = len(self._link.values) <= 100 and len(self._sequence.reasons) <= 10
-        require(bounded, f"keeps {len(self._link.values)} parameters")
+        bounded = len(self._link.parameters.values) <= 100 and len(self._sequence.reasons) <= 10
+        require(bounded, f"keeps {len(self._link.parameters.values)} parameters")
 
 
 class FakeUdp:

@@ -23,7 +23,7 @@ from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
+from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.ports import Ports

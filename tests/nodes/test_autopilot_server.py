@@ -22,8 +22,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot import server
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Signing, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 from uam_sim_bridge.ports import PortError
 
@@ -133,7 +132,7 @@ def test_arms_flies_and_tracks_rate_steps(flight):
     assert rates[-20:, 0].mean() == pytest.approx(1.0, rel=0.15)
     assert np.abs(rates[:, 1:]).max() < 0.1
     # parameters of the mapping were read and agree
-    assert flight.link.values["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert flight.link.parameters.values["MC_ROLLRATE_P"] == pytest.approx(0.15)
     assert flight.link.warnings == ()
 
 

@@ -13,8 +13,7 @@ from bridge_rig import MODULE, WEIGHT
 from uam_control.offboard.modes import Mode
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Signing, mavlink2
 
 
 def test_a_port_in_use_is_a_one_line_error(start):

@@ -150,7 +150,9 @@ def bench(start):
 def test_arms_over_the_line_and_ends_with_the_simulator(bench):
     b = bench()
     b.arm()
-    assert b.link.mode is Mode.OFFBOARD and b.link.values["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert b.link.mode is Mode.OFFBOARD and b.link.parameters.values[
+        "MC_ROLLRATE_P"
+    ] == pytest.approx(0.15)
     b.hil.close()
     assert b.router.process.wait(PATIENCE) == 0
     assert "the simulator closed the link" in b.router.output

@@ -14,8 +14,7 @@ from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.targets import AttitudeTarget
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Signing, mavlink2
 from uam_sim_bridge.mavlink.transport.faulty_transport import GroundStation
 from uam_sim_bridge.ports import PortError
 

@@ -89,7 +89,7 @@ def test_parameters_without_a_request_are_not_stored():
     )
     link = OffboardLink(transport, OffboardSequence(), RateThrustParameters.of(load_description()))
     link.poll(0.0)
-    assert list(link.values) == ["MC_ROLLRATE_P"]
+    assert list(link.parameters.values) == ["MC_ROLLRATE_P"]
 
 
 @pytest.mark.parametrize("microseconds", [2**63 // 1000, 2**63, 2**64 - 1])

@@ -16,9 +16,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.link.link import UNSIGNED, OffboardLink
-from uam_sim_bridge.mavlink.link.link_report import faults, report
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Signing, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, EventMessage, event_id
 from uam_sim_bridge.mavlink.telemetry.streams import ON_CHANGE, ONLY_COUNTED, RATES
 
@@ -148,13 +146,13 @@ def test_time_is_compared_both_ways(rig):
 
 def test_the_report_shows_the_autopilots_health(rig):
     rig.fly()
-    values = report(rig.link)
+    values = rig.link.values()
     assert "attitude" in values["estimator"] and values["battery [V]"] is None
-    assert faults(rig.link) == () and values["sensors unhealthy"] == ""
+    assert rig.link.faults() == () and values["sensors unhealthy"] == ""
     rig.vision = False
     rig.run(2.0)
-    assert "autopilot: no horizontal position estimate" in faults(rig.link)
-    assert report(rig.link)["sensors unhealthy"] == "vision_position"
+    assert "autopilot: no horizontal position estimate" in rig.link.faults()
+    assert rig.link.values()["sensors unhealthy"] == "vision_position"
 
 
 def test_a_battery_that_only_sys_status_reports(rig):
@@ -400,7 +398,7 @@ def test_integer_parameters_are_read_by_type(rig):
         )
     )
     rig.run(0.1)
-    assert rig.link.values["MC_ROLLRATE_P"] == 7
+    assert rig.link.parameters.values["MC_ROLLRATE_P"] == 7
 
 
 def test_the_link_requests_the_reasons_of_a_refused_arming(rig):

@@ -3,8 +3,7 @@
 import pytest
 from set_clock import SetClock
 
-from uam_sim_bridge.mavlink.protocol.signing import EPOCH, Signing, wall_steps
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import EPOCH, Codec, Framer, Signing, mavlink2, wall_steps
 from uam_sim_bridge.ports import PortError
 
 KEY, OTHER = bytes(range(32)), bytes(32)

@@ -97,7 +97,6 @@ class JoinedAutopilot(FlightState):
         super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
-        self.landed = self.failsafe = self.killed = False
         self.memory = record(WHOLE, REAL)
         self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0, 0.0)
         self.link = DirectLink(Schedule())  # its faults

@@ -44,8 +44,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.hil.hil_messages import CONTROLS
 from uam_sim_bridge.mavlink.hil.sitl_ports import Program, UdpPort, connect, fill_ports
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, Signing, mavlink2
 from uam_sim_bridge.mavlink.transport.stream_transport import SerialTransport
 from uam_sim_bridge.mavlink.transport.transport import open_transport
 

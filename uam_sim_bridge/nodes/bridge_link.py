@@ -13,8 +13,7 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.devices.magnet.lines import SwitchingParameters
 from uam_sim_bridge.faults import LINK, Schedule
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Signing, mavlink2
 from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.mavlink.transport.faulty_transport import (
     FaultyTransport,

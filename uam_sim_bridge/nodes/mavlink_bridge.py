@@ -47,7 +47,6 @@ from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
-from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import vision_message
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
 from uam_sim_bridge.nodes.autopilot_topics import WAKE_UP as IMU_WAKE_UP
@@ -266,12 +265,12 @@ class MavlinkBridgeNode(UamNode):
         if not adopting or link.armed or not link.parameters.mapping_read:
             return
         old = self.stage.map.parameters
-        changes = tuple(differences(old, link.values, link.sequence.firmware))
+        changes = tuple(differences(old, link.parameters.values, link.sequence.firmware))
         if not changes or changes == self._adopted:
             return
         self._adopted = changes
         try:
-            new = adopted(old, link.values, link.sequence.firmware)
+            new = adopted(old, link.parameters.values, link.sequence.firmware)
         except ParameterError as error:
             self.get_logger().warning(f"the autopilot's parameters are not adopted: {error}")
             return
@@ -323,7 +322,7 @@ class MavlinkBridgeNode(UamNode):
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         link, sequence = self.link, self.stage.sequence
         magnet = self._magnet
-        notes = (*sequence.reasons, *faults(link), *link.warnings)
+        notes = (*sequence.reasons, *link.faults(), *link.warnings)
         notes += () if magnet is None else magnet.problems()
         if refused := self.stage.source.refused:
             notes += (f"setpoint refused: {refused}",)
@@ -342,7 +341,7 @@ class MavlinkBridgeNode(UamNode):
             "ground station held back": self._station.held_back if self._station else None,
             "level hold": self.stage.source.hold.active,
             "adopted": "; ".join(self._adopted),
-            **report(link),
+            **link.values(),
             **({} if self._imu is None else self._imu.values()),
             **({} if magnet is None else magnet.values()),
             "loop delay [ms]": _text(1e3 * self.stage.loop_delay.value, ".1f"),

@@ -17,8 +17,14 @@ from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.targets import Target, VisionPose
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.protocol.setpoint_messages import setpoint_message, vision_message
-from uam_sim_bridge.mavlink.protocol.signing import Signing
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import (
+    Codec,
+    Framer,
+    Message,
+    Signing,
+    TextAssembler,
+    mavlink2,
+)
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import NUMBER as HIGHRES_IMU
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
@@ -28,7 +34,7 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import setting as paramete
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.mavlink.telemetry.streams import LinkStatistics, StreamCheck
 from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
-from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
+from uam_sim_bridge.mavlink.telemetry.vitals import ESTIMATOR_FLAGS, Vitals, estimate_faults, names
 from uam_sim_bridge.mavlink.transport.transport import Transport
 
 HEARTBEAT_PERIOD = 1.0  # s
@@ -49,12 +55,10 @@ EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 class OffboardLink(FlightState):
     """State of the autopilot from its messages, and the messages to it.
 
-    `mode`, `armed`, `intended`, `armed_since`: see `FlightState`; `failsafe`, `landed`, `killed`
-    (the kill switch is engaged): latest report; `values`: its parameters (watched and required
-    ones) by name; `parameters`: their comparison; `ignored`: number of messages from other systems
-    or for other receivers; `vitals`: battery, estimator and sensors; `reboots`: number of restarts;
-    `foreign`: system ids of other autopilots whose heartbeats have come;
-    `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
+    See `FlightState`. `parameters`: comparison of the watched and required ones; `ignored`: number
+    of messages from other systems or for other receivers; `vitals`: battery, estimator and sensors;
+    `reboots`: number of restarts; `foreign`: system ids of other autopilots whose heartbeats have
+    come; `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
     `alive`: connected at the last `maintain`; `transport`, `codec`, `framer`: of the messages.
     """
 
@@ -75,7 +79,6 @@ class OffboardLink(FlightState):
         super().__init__()
         self._clock = clock
         self.sequence = sequence
-        self.landed = self.failsafe = self.killed = False
         self.ignored = self.reboots = 0
         self.foreign: set[int] = set()
         self.vitals = Vitals()
@@ -88,7 +91,6 @@ class OffboardLink(FlightState):
         self._firmware = spoken = sequence.firmware
         self._events = EventReader(spoken)
         self.parameters = ParameterWatch(mapping, required, spoken)
-        self.values = self.parameters.values
         self.transport = transport
         self._target = target_system
         self.codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
@@ -128,7 +130,7 @@ class OffboardLink(FlightState):
     @property
     def loss_time(self) -> float:
         """For how long [s] the autopilot stays in OFFBOARD without setpoints; at least LINK_GAP."""
-        return max(LINK_GAP, self.values.get(self._firmware.loss_time, LOSS_TIME))
+        return max(LINK_GAP, self.parameters.values.get(self._firmware.loss_time, LOSS_TIME))
 
     @property
     def round_trip(self) -> float | None:
@@ -224,6 +226,30 @@ class OffboardLink(FlightState):
     def close(self) -> None:
         """Close the transport."""
         self.transport.close()
+
+    def values(self) -> dict[str, str | int | None]:
+        """Return the values for /diagnostics; None before the first message with the value."""
+        vitals, sync = self.vitals, self.time_sync
+        flags, battery = vitals.estimator_flags, vitals.battery
+        return {
+            "round trip [ms]": _scaled(sync.round_trip, 1e3, ".1f"),
+            "clock offset [ms]": _scaled(sync.offset, 1e3, ".1f"),
+            "messages [1/s]": f"{self.statistics.rate:.0f}",
+            "messages lost": self.lost,
+            "bad bytes": self.framer.bad_bytes,
+            "reboots of the autopilot": self.reboots,
+            "estimator": None if flags is None else ", ".join(names(flags, ESTIMATOR_FLAGS)),
+            "sensors unhealthy": ", ".join(vitals.unhealthy),
+            "autopilot load [%]": _scaled(vitals.load, 100.0, ".0f"),
+            "battery [V]": f"{battery.voltage:.2f}" if battery and battery.known else None,
+        }
+
+    def faults(self) -> tuple[str, ...]:
+        """Return one text per fault of the autopilot's estimate; () while it is disarmed."""
+        flags = self.vitals.estimator_flags
+        if not self.armed or flags is None:
+            return ()
+        return tuple(f"autopilot: {fault}" for fault in estimate_faults(flags))
 
     def _note_foreign(self, m: Message) -> None:
         if m.get_type() == "HEARTBEAT" and m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
@@ -351,3 +377,7 @@ class OffboardLink(FlightState):
         for name, value, kind in () if self.armed else self.parameters.to_write(time):
             as_bytes = self._firmware.integers_as_bytes
             self._send(parameter_setting(name, value, kind, self._target, as_bytes))
+
+
+def _scaled(value: float | None, scale: float, form: str) -> str | None:
+    return None if value is None else format(scale * value, form)

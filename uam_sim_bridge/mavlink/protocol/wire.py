@@ -1,17 +1,28 @@
-"""Bytes ↔ MAVLink 2 messages, robust against invalid bytes.
+"""Bytes ↔ MAVLink 2 messages, robust against invalid bytes; signing of MAVLink 2.
 
 After a false start byte pymavlink's stream parser skips as many bytes as the false length says.
 `Framer` continues one byte after a false start, so that invalid bytes never hide a valid message
 behind them.
+
+pymavlink signs and checks. Packets without the shared key's signature are refused, and replays. The
+time of signatures has steps of 10 us since 2015-01-01 (wall clock) and never decreases within a
+process. A packet is a replay if its time is not above that of the last packet of its sender and
+link. The first packet of a sender may be at most a minute old.
 """
+
+from __future__ import annotations
 
 import re
 import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from pymavlink.dialects.v20 import development as mavlink2
 
 from uam_control.settings.texts import visible
-from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
+from uam_sim_bridge.ports import PortError
 
 MARKER_1, MARKER_2 = 0xFE, 0xFD
 _OVERHEAD_1, _OVERHEAD_2, _SIGNATURE = 8, 12, 13
@@ -25,6 +36,46 @@ UNREAD = {8: 117, 290: 251, 291: 10, 361: 93, 371: 10, 380: 232, 411: 106, 413: 
 
 Message = mavlink2.MAVLink_message
 
+EPOCH = 1_420_070_400  # 2015-01-01 00:00 UTC as Unix time [s]
+_STEPS = 100_000  # per second
+_KEY = re.compile(r"[0-9a-fA-F]{64}")
+_FILE_LIMIT = 200  # bytes: a key and some white space
+
+
+def wall_steps() -> int:
+    """Return the current time of signatures: steps of 10 us since 2015-01-01."""
+    return max(0, time.time_ns() // 10_000 - EPOCH * _STEPS)
+
+
+@dataclass(frozen=True)
+class Signing:
+    """Shared key (32 bytes, not in repr), id of this link (0..255) and clock (see wall_steps)."""
+
+    key: bytes = field(repr=False)
+    link_id: int = 0
+    clock: Callable[[], int] = wall_steps
+
+    @classmethod
+    def from_text(cls, text: str, link_id: int = 0) -> Signing | None:
+        """Return the signing of `text`: 64 hex digits, or a file with them; None for ''.
+
+        Raises PortError in one line. The message does not contain the text, which may be a key.
+        """
+        if not text:
+            return None
+        if not _KEY.fullmatch(text):
+            try:
+                with Path(text).expanduser().open("rb") as file:
+                    text = file.read(_FILE_LIMIT).decode("ascii").strip()
+            except (OSError, ValueError, RuntimeError) as error:
+                reason = getattr(error, "strerror", None) or "not a text"
+                raise PortError(
+                    f"signing key: not 64 hex digits, and as a file: {reason}"
+                ) from None
+            if not _KEY.fullmatch(text):
+                raise PortError("signing key: the file does not hold 64 hex digits")
+        return cls(bytes.fromhex(text), link_id)
+
 
 class Codec:
     """Encodes messages of one sender (system and component id) and decodes those of others.
@@ -35,21 +86,25 @@ class Codec:
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
         self._mav = mavlink2.MAVLink(None, srcSystem=system, srcComponent=component)
-        self._seal = None if signing is None else Seal(self._mav, signing)
+        self._signing, self._signed = signing, self._mav.signing
+        self._accepted: dict[tuple[int, int, int], int] = {}  # times of the senders
         self.unsigned: int | None = None
+        if signing is not None:
+            self._signed.secret_key, self._signed.link_id = signing.key, signing.link_id
+            self._signed.sign_outgoing = True
+            self._signed.allow_unsigned_callback = lambda *_: False  # needed for reject_count
 
     @property
     def refused(self) -> int:
         """Return the number of refused frames: unsigned, signed with another key, or replayed."""
-        return 0 if self._seal is None else self._seal.refused
+        return self._signed.reject_count
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of `message` with the next sequence number.
 
         Raises struct.error if a value does not fit its field.
         """
-        if self._seal is not None:
-            self._seal.refresh()
+        self._set_time()
         frame = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         return frame
@@ -59,18 +114,25 @@ class Codec:
 
         A message that is not in the dialect is invalid: its checksum cannot be tested.
         """
-        if self._seal is not None:
-            self._seal.refresh()
+        self._set_time()
         message = None
         try:
             message = self._mav.decode(bytearray(frame))
         except (mavlink2.MAVError, struct.error, ValueError, IndexError, KeyError):
             pass
-        if self._seal is not None:
-            self._seal.settle(message is not None)
-            if message is None:
-                self._note_unsigned(frame)
+        # pymavlink stores a packet's time before it checks the signature: a forged packet with a
+        # future time would otherwise lock out the true sender
+        if message is not None:
+            self._accepted = dict(self._signed.stream_timestamps)
+        elif self._signing is not None:
+            self._signed.stream_timestamps = dict(self._accepted)
+            self._note_unsigned(frame)
         return None if isinstance(message, mavlink2.MAVLink_unknown) else message
+
+    def _set_time(self) -> None:
+        """Set the time of signatures to the clock; it never decreases."""
+        if self._signing is not None:
+            self._signed.timestamp = max(self._signed.timestamp, self._signing.clock())
 
     def _note_unsigned(self, frame: bytes) -> None:
         """Take the kind of autopilot from an unsigned heartbeat (MAVLink 2)."""

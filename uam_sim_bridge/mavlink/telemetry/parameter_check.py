@@ -176,11 +176,11 @@ def unanswered(names: Iterable[str], attempts: int) -> Iterator[str]:
         yield f"{name}: no answer from the autopilot to {attempts} requests"
 
 
-class ParameterWatch:
+class ParameterWatch(ParameterReader):
     """Reads the firmware's watched parameters and those required, and compares them.
 
-    `values`: received parameters by name; `warnings`: one line per problem; `writing`: whether
-    `to_write` returns parameters; `written`: one line per parameter that it has returned.
+    `warnings`: one line per problem, of missing parameters after ATTEMPTS requests; `writing`:
+    whether `to_write` returns parameters; `written`: one line per parameter that it has returned.
     """
 
     def __init__(
@@ -193,18 +193,16 @@ class ParameterWatch:
         self._spoken = spoken
         self.warnings: tuple[str, ...] = ()
         self.required = RequiredParameters() if required is None else required
-        names = (*spoken.watched, *self.required)
-        self._reader = ParameterReader(names, self.required.instead, spoken.integers_as_bytes)
-        self.values = self._reader.values
         self._mapping = mapping
         self.writing, self.written = False, ()
         self._writes: dict[str, int] = {}  # of parameters whose first value was not the required
         self._write_due = -math.inf
-        self._compare()
+        names = (*spoken.watched, *self.required)
+        super().__init__(names, self.required.instead, spoken.integers_as_bytes)
 
     def restart(self) -> None:
         """Discard all values and request them again."""
-        self._reader.restart()
+        super().restart()
         self._writes.clear()
         self._compare()
 
@@ -219,14 +217,9 @@ class ParameterWatch:
         return all(name in self.values for name in expected(self._mapping, self._spoken))
 
     @property
-    def complete(self) -> bool:
-        """Return whether nothing is waited for: all received, or ATTEMPTS requests in vain."""
-        return self._reader.complete
-
-    @property
     def expected(self) -> list[str]:
         """Return the required parameters that this autopilot has, or should have."""
-        waited = set(self._reader.missing)
+        waited = set(self.missing)
         return [name for name in self.required if name in self.values or name in waited]
 
     @property
@@ -234,12 +227,11 @@ class ParameterWatch:
         """Return the differences from the required parameters; unanswered ones once complete."""
         return self.required.differences(self.values, unanswered=self.complete)
 
-    def take(self, message: Message) -> None:
-        """Store the value of a PARAM_VALUE; other parameters are ignored."""
+    def take(self, message: Message) -> str:
         known = set(self.values)
-        name = self._reader.take(message)
+        name = super().take(message)
         if not name:
-            return
+            return ""
         rule = self.required.get(name)
         wrong = rule is not None and len(rule.values) == 1 and not rule.met(self.values[name])
         if wrong and name not in known:
@@ -247,15 +239,11 @@ class ParameterWatch:
         else:  # the answer, or changed by somebody else, who keeps it
             self._writes.pop(name, None)
         self._compare()
+        return name
 
     def due(self, time: float) -> list[str]:
-        """Return the names to request at the tick `time` [s].
-
-        After ATTEMPTS requests of each the list is empty and `warnings` names the missing ones.
-        """
-        before = self._reader.given_up
-        names = self._reader.due(time)
-        if self._reader.given_up is not before:
+        before, names = self.given_up, super().due(time)
+        if self.given_up is not before:
             self._compare()
         return names
 
@@ -276,11 +264,11 @@ class ParameterWatch:
                 self.written += (f"{name} was {found:.9g}: set to {value:.9g}",)
             if count < WRITES:
                 self._writes[name] = count + 1
-                due.append((name, value, self._reader.types[name]))
+                due.append((name, value, self.types[name]))
         return due
 
     def _compare(self) -> None:
-        given_up = self._reader.missing if self._reader.given_up else ()
+        given_up = self.missing if self.given_up else ()
         self.warnings = (
             *differences(self._mapping, self.values, self._spoken),
             *stream_loss(self.values, self._spoken),

@@ -16,7 +16,6 @@ from collections.abc import Callable
 
 import serial
 
-from uam_sim_bridge.mavlink.transport.udp_transport import resolve
 from uam_sim_bridge.ports import PortError
 
 FIRST_RETRY, LAST_RETRY = 0.1, 5.0  # s between attempts to open: first value, doubled up to last
@@ -26,6 +25,15 @@ BITS_PER_BYTE = 10  # start, eight data bits, stop
 CONNECT_PATIENCE = 3.0  # s, time limit of one attempt to connect
 # ms without an acknowledgement after which the link is lost: setpoints must not arrive much later
 SILENT_PEER = 1500
+
+
+def resolve(host: str) -> str:
+    """Return the IPv4 address of a host name; raises PortError in one line if there is none."""
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise PortError(f"host {host}: {reason}") from None
 
 
 class StreamTransport:

@@ -8,13 +8,19 @@
 | `serial:DEVICE:BAUD` | serial line or USB; opened again after unplugging |
 """
 
+import ipaddress
 from dataclasses import dataclass
 from typing import Protocol
 
-from uam_sim_bridge.mavlink.transport.stream_transport import SerialTransport, TcpTransport
-from uam_sim_bridge.mavlink.transport.udp_transport import READ_LIMIT, UdpTransport
-from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.mavlink.transport.stream_transport import (
+    READ_LIMIT,
+    SerialTransport,
+    TcpTransport,
+    resolve,
+)
+from uam_sim_bridge.ports import PortError, bound
 
+LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 ALLOWED = "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT, serial:DEVICE:BAUD"
 SLOWEST, FASTEST = 9600, 12_500_000  # baud
 
@@ -39,6 +45,65 @@ class Transport(Protocol):
     def fileno(self) -> int: ...
 
     def close(self) -> None: ...
+
+
+class UdpTransport:
+    """UDP between a local port and one peer; packets of other senders are ignored.
+
+    The local port is bound to loopback if the peer is on this machine. `dropped`: datagrams that
+    could not be sent.
+    """
+
+    stream = False
+    bytes_per_second = None
+    connected = True
+
+    def __init__(
+        self, local_port: int, remote: tuple[str, int], read_limit: int = READ_LIMIT
+    ) -> None:
+        """local_port: 0 for any; remote: host, port; read_limit: bytes read per `receive`.
+
+        Raises PortError in one line if the local port is in use or the host is unknown.
+        """
+        self._remote = (resolve(remote[0]), remote[1])
+        self._read_limit = read_limit
+        self.dropped = 0
+        here = ipaddress.ip_address(self._remote[0]).is_loopback
+        self._socket = bound("UDP", LOOPBACK if here else EVERYWHERE, local_port, "MAVLink")
+        self._socket.setblocking(False)
+
+    def send(self, data: bytes) -> bool:
+        """Send one datagram; return whether it was sent. A failure is counted, not raised."""
+        try:
+            self._socket.sendto(data, self._remote)
+        except OSError:
+            self.dropped += 1
+            return False
+        return True
+
+    def receive(self) -> list[bytes]:
+        """Return the peer's datagrams; those of other senders count towards the limit as well."""
+        datagrams, left = [], self._read_limit
+        while left > 0:
+            try:
+                data, sender = self._socket.recvfrom(65535)
+            except ConnectionError:  # the peer's port was closed at the last send
+                left -= 1
+                continue
+            except OSError:  # no datagram, or no network
+                break
+            left -= max(1, len(data))
+            if sender == self._remote:
+                datagrams.append(data)
+        return datagrams
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, for select."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Release the port."""
+        self._socket.close()
 
 
 @dataclass(frozen=True)
