@@ -22,8 +22,7 @@ from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration, yaml_file
 from uam_control.vehicle import load_description
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
-from uam_lab.records.results.hand_columns import TRUTH
-from uam_lab.records.results.timeseries import Series
+from uam_lab.records.results.timeseries import TRUTH, Series
 from uam_sim_bridge.plant.effects import presets
 
 WIDTHS, HEIGHTS = (0.03, 0.04, 0.05), (0.6, 0.727)  # [m] of the box, of the stand

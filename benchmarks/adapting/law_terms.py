@@ -13,7 +13,7 @@ import numpy as np
 from uam_control.coordinates import Z
 from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
-from uam_lab.analysis import coupling, dynamics, supply, ticks, tracking
+from uam_lab.analysis import coupling, dynamics, supply, tracking
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
 from uam_lab.records.results.timeseries import SUBSYSTEMS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
@@ -39,10 +39,10 @@ def shares(
     sets: parameter sets by node; payload_mass [kg]; phases: the ticks used, () for all in the air.
     {} with too few ticks.
     """
-    rows = ticks.airborne(series)
+    rows = tracking.airborne(series)
     if phases:
         rows = rows[np.any([series.in_phase(name)[rows] for name in phases], axis=0)]
-    if len(rows) < ticks.FEWEST:
+    if len(rows) < tracking.FEWEST:
         return {}
     printed = sets[NODE_OF["attitude"]].error_rate_form == "printed"
     estimate = tracking.along(series, rows, "estimate", printed)

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_lab.experiments.campaign.report import _with_band
-from uam_lab.experiments.campaign.statistics import BINS, percentile, share, sliced
+from uam_lab.experiments.campaign.report import BINS, _with_band, percentile, share, sliced
 from uam_lab.records.results.templates import render
 
 

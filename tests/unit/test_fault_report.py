@@ -16,7 +16,7 @@ from uam_lab.experiments.faults import report as fault_report
 from uam_lab.experiments.faults.trial import FaultResult
 from uam_lab.experiments.trials.outcome import OUTCOMES, classify, down_after, explained
 from uam_lab.records.results import metrics
-from uam_lab.report.figures import fault_marks, figures
+from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import pages
@@ -66,11 +66,11 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
     html = pages.write_page(flight_folder).read_text()
     assert "Faults injected in this flight" in html and "<code>clock_jump</code>" in html
-    assert fault_marks.handles(flight.info) == []
+    assert panels.fault_handles(flight.info) == []
 
 
 def test_letters_go_on_after_z():
-    assert [fault_marks.letter(n) for n in (0, 25, 26, 27, 701, 702)] == [
+    assert [panels.letter(n) for n in (0, 25, 26, 27, 701, 702)] == [
         "A",
         "Z",
         "AA",

@@ -14,8 +14,14 @@ from hypothesis import strategies as st
 from servo_shafts import StillShaft
 
 from uam_control.settings import configuration
-from uam_lab.flights.vehicle.lab import LabError, Room
-from uam_lab.flights.vehicle.lab_file import REQUIRED, load_lab, settings_of, template
+from uam_lab.flights.vehicle.lab_file import (
+    REQUIRED,
+    LabError,
+    Room,
+    load_lab,
+    settings_of,
+    template,
+)
 from uam_lab.flights.vehicle.vehicle_nodes import parameters
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_sim_bridge.devices.dynamixel.chain import ArmError

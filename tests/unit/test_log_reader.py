@@ -18,7 +18,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.flights.flight_settings import settings
-from uam_lab.flights.ros.logged_outcome import logged
+from uam_lab.flights.ros.supervise import logged
 from uam_lab.records.recording import log_reader, logged_topics
 from uam_lab.records.recording.bag import schema
 from uam_lab.records.recording.bounded_log import BoundedLog

@@ -20,8 +20,7 @@ from uam_lab.flights.operator import DECODE
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.engine import REFUSED as REFUSAL
-from uam_lab.flights.vehicle.lab import LabError
-from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
+from uam_lab.flights.vehicle.lab_file import LabError, load_lab, settings_of, template
 from uam_lab.records.recording.logged_topics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics

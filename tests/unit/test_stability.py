@@ -8,7 +8,7 @@ from default_columns import COLUMNS
 
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
-from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
+from uam_lab.analysis import constants, lyapunov_bound, stability, tracking
 from uam_lab.analysis.coupling import nominal_inertia
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.stability import analyse_folder
@@ -235,4 +235,4 @@ def test_no_analysis_of_other_laws_and_of_a_vehicle_on_the_ground(short_direct_f
     )
     assert stability.analyse(grounded, sets, Vehicle.load(), 0.2) is None
     empty = Series(series.values[:0], series.phases[:0], series.phase_names, {}, series.columns)
-    assert len(ticks.in_the_air(empty)) == 0
+    assert len(tracking.in_the_air(empty)) == 0

@@ -6,7 +6,7 @@ from designing import vehicles
 
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import load_description
-from uam_lab.analysis import dynamics, supply, ticks
+from uam_lab.analysis import dynamics, supply, tracking
 from uam_lab.analysis.dynamics import Body
 from uam_sim_bridge.plant import Vehicle
 
@@ -91,7 +91,7 @@ def test_coriolis_forces_are_quadratic_and_conserve_the_kinetic_energy(seed):
 
 def balance(series, payload_mass):
     """Return rotor wrench + drag - (M chi_ddot + C chi_dot + g) - pivot (m, 6), and the ticks."""
-    rows = ticks.in_the_air(series)
+    rows = tracking.in_the_air(series)
     truth = series.block("truth.").reshape(-1, 3, 8)[rows]
     found = dynamics.along(series, rows, VEHICLE, payload_mass)
     wrench = supply.rotor_wrench(series, rows, Body(VEHICLE))
@@ -121,7 +121,7 @@ def test_recorded_accelerations_with_payload(direct_flight):
 def test_terms_of_the_law_add_up_to_the_recorded_tau(direct_flight):
     from uam_lab.analysis import tracking
 
-    rows = ticks.in_the_air(direct_flight)
+    rows = tracking.in_the_air(direct_flight)
     sets = load_profile("s500").sets
     estimate = tracking.along(direct_flight, rows, "estimate", printed=False)
     terms = supply.along(direct_flight, rows, estimate, sets, Body(VEHICLE))

@@ -18,8 +18,7 @@ from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.progress import Progress, device_table
 from uam_lab.flights.vehicle import vehicle_engine, vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
-from uam_lab.flights.vehicle.lab import Magnet
-from uam_lab.flights.vehicle.lab_file import load_lab, settings_of, template
+from uam_lab.flights.vehicle.lab_file import Magnet, load_lab, settings_of, template
 from uam_lab.flights.vehicle.vehicle_engine import FlightRun, VehicleCourse
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.terminal import Terminal

@@ -14,7 +14,6 @@ import pytest
 import tiny_work
 from distributed import LocalCluster
 
-from uam_lab.experiments.workers import local_cluster
 from uam_lab.experiments.workers import workers as module
 from uam_lab.experiments.workers.identity import difference, identity
 from uam_lab.experiments.workers.place import WorkersError, Workplace
@@ -147,9 +146,9 @@ def test_a_cluster_that_closes_late_costs_no_result(monkeypatch):
             closed.append(timeout)
             raise TimeoutError("not within 5 s")
 
-    monkeypatch.setattr(local_cluster, "LocalCluster", Late)
-    with local_cluster.local_cluster(2):
+    monkeypatch.setattr(module, "LocalCluster", Late)
+    with module.local_cluster(2):
         """The results are there."""
-    assert closed == [local_cluster.CLOSING]
-    with pytest.raises(ValueError, match="in the block"), local_cluster.local_cluster(2):
+    assert closed == [module.CLOSING]
+    with pytest.raises(ValueError, match="in the block"), module.local_cluster(2):
         raise ValueError("in the block")

@@ -17,7 +17,7 @@ import numpy as np
 
 from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.laws.modular import ModularParameters
-from uam_lab.analysis import ticks
+from uam_lab.analysis import tracking
 from uam_lab.analysis.coupling import nominal_inertia
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
@@ -88,7 +88,7 @@ def acceleration(
     if parameters.acceleration_limit:
         raw = np.minimum(raw, parameters.acceleration_limit)
     if parameters.acceleration_cutoff:
-        dt = ticks.period(series)
+        dt = tracking.period(series)
         keep = np.exp(-2.0 * np.pi * parameters.acceleration_cutoff * dt)
         raw = lfilter([1.0 - keep], [1.0, -keep], raw)
     seen = raw[rows]

@@ -22,7 +22,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_control.maths.rotations import quaternion_from_euler
-from uam_lab.analysis import ticks
+from uam_lab.analysis import tracking
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
@@ -150,7 +150,7 @@ def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: floa
     count, size = len(rows), series.columns.size
     truth = series.block("truth.").reshape(-1, 3, size)[rows]
     swing = pivot_motion(series)[rows]
-    held = ticks.carrying(series)[rows] if payload_mass else np.zeros(count, dtype=bool)
+    held = tracking.carrying(series)[rows] if payload_mass else np.zeros(count, dtype=bool)
     bare = Body(vehicle)
     loaded = bare
     if held.any():
@@ -169,8 +169,8 @@ def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: floa
 def pivot_motion(series: Series) -> np.ndarray:
     """Return angle [rad], rate and acceleration (ticks, 3) of the pivot, by differences."""
     angle = np.nan_to_num(series["magnet.swing"])
-    rate = np.gradient(angle, ticks.period(series))
-    return np.column_stack([angle, rate, np.gradient(rate, ticks.period(series))])
+    rate = np.gradient(angle, tracking.period(series))
+    return np.column_stack([angle, rate, np.gradient(rate, tracking.period(series))])
 
 
 def hold(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:

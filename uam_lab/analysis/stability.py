@@ -17,7 +17,6 @@ from uam_lab.analysis import (
     dynamics,
     lyapunov_bound,
     supply,
-    ticks,
     tracking,
 )
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
@@ -161,8 +160,8 @@ def analyse(series: Series, sets: dict, vehicle: Vehicle, payload_mass: float) -
     sets: the profile's parameter sets by node; payload_mass [kg].
     Returns None if fewer than ticks.FEWEST airborne ticks have finite adaptation.* columns.
     """
-    rows = ticks.in_the_air(series)
-    if len(rows) < ticks.FEWEST:
+    rows = tracking.in_the_air(series)
+    if len(rows) < tracking.FEWEST:
         return None
     printed = sets["attitude_controller"].error_rate_form == "printed"
     truth, estimate = (

@@ -28,8 +28,7 @@ from typing import TYPE_CHECKING
 from uam_control.settings.atomic import write_text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import Command, number, path
-from uam_lab.flights.vehicle.lab import LabError
-from uam_lab.flights.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
+from uam_lab.flights.vehicle.lab_file import LabError, lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_lab.records.results.terminal import say
 from uam_sim_bridge.devices.mocap.mocap_parameters import (
     LIBRARY,

@@ -17,8 +17,7 @@ import argparse
 from rich.text import Text
 
 from uam_lab.cli.command import Command
-from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.flights.vehicle.lab_file import Lab, load_lab
 from uam_lab.preflight.doctor.finding import Finding, Verdict
 from uam_lab.preflight.doctor.run import as_json, examine, worst
 from uam_lab.records.results.terminal import Terminal, say

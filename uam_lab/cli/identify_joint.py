@@ -52,7 +52,7 @@ def add(command: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     from uam_lab.records.results.result_folder import make_folder
-    from uam_lab.report.figures.joint_friction import draw
+    from uam_lab.report.figures.hand_figures import draw_friction
     from uam_sim_bridge.devices.dynamixel.excitation import Aborted, centre_of, excite
     from uam_sim_bridge.devices.dynamixel.friction_fit import FitError, fit_friction
 
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     head = "time_s,angle_rad,effort_nm,weight_nm"
     with replacing(out / "samples.csv") as temporary:
         np.savetxt(temporary, np.column_stack(columns), "%.6f", ",", header=head, comments="")
-    draw(out / "friction.png", options.joint, fit)
+    draw_friction(out / "friction.png", options.joint, fit)
     say(text, end="")
     say(f"residual {fit.residual:.4f} N m, inertia {fit.inertia:.4f} kg m^2")
     if not fit.scale_known:

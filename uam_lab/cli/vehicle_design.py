@@ -32,7 +32,7 @@ def add(command: Command) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    from uam_lab.experiments.design import files, search
+    from uam_lab.experiments.design import search
     from uam_lab.experiments.design.criteria import load_criteria
 
     described = load_description(options.name)
@@ -40,10 +40,10 @@ def run(options: argparse.Namespace) -> int:
     folder, shipped = options.out, described.source == described.name
     if folder is not None or shipped:
         folder = make_folder(folder, "design")
-    written = files.files_of(described, folder or described.file.parent)
+    written = search.files_of(described, folder or described.file.parent)
     made = search.design(described, criteria, say)
-    files.write(made, written)
-    say(files.table(made))
+    search.write(made, written)
+    say(search.table(made))
     for file in written.values():
         say(f"written  {file}")
     numbers = load_description(options.name).numbers  # one that derives has its own design now

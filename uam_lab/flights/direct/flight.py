@@ -4,9 +4,14 @@ One pass of the loop is one control tick, in the order of a lockstep flight with
 stages of `ControlTick`, autopilot, physics. Most passes are compiled, see `compiled_ticks`.
 """
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.maths.rotations import tilt, wrap_angle
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.offboard.offboard_parameters import OffboardParameters
@@ -18,7 +23,11 @@ from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flights.direct.compiled_ticks import CompiledTicks
 from uam_lab.flights.direct.record import TickRecorder
+from uam_lab.flights.flight_settings import AUTOPILOT_IMU, FlightSettings
+from uam_lab.flights.observer import FlightStatus, Observer
+from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.records.results.outcome import Outcome, grasp_decisions, transitions
+from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.timeseries import FlightTable
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -236,3 +245,55 @@ class DirectFlight:
 def _stamped(sample: tuple) -> tuple:
     """Return a sample with its stamp in [ns] instead of [s]."""
     return nanoseconds(sample[0]), *sample[1:]
+
+
+def fly(
+    settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+) -> Outcome:
+    """Fly until the mission is done or a stop is requested."""
+    observer.started(None)
+    vehicle = Vehicle.of(settings.vehicle).changed(settings.vehicle_changes)
+    flight = DirectFlight(
+        settings.scenario,
+        settings.profile,
+        vehicle,
+        settings.payload_mass,
+        settings.seed,
+        settings.faults,
+        settings.plant,
+        settings.imu == AUTOPILOT_IMU,
+    )
+    flight.say = observer.message
+    folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
+    begin = time.monotonic()
+
+    def report(_: float, __: str) -> bool:
+        """Show where the flight is; return whether it ends."""
+        if not stop.raised and flight.recording.count:
+            observer.update(_status(flight, time.monotonic() - begin))
+        return stop.raised
+
+    flight.run(report)
+    wall, interrupted = time.monotonic() - begin, stop.raised and not flight.mission.output.done
+    return flight.outcome(wall_s=wall, interrupted=interrupted)
+
+
+def _status(flight: DirectFlight, wall: float) -> FlightStatus:
+    """Return where the flight is; wall [s]: since its begin."""
+    recording = flight.recording
+    row, output = recording.values[recording.count - 1], flight.mission.output
+    columns = recording.columns
+    size = columns.size
+    estimate = row[columns.block("estimate.")][:size]
+    error = estimate - row[columns.block("reference.")][:size]
+    error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
+    norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
+    return FlightStatus(
+        phase=output.phase,
+        time=output.time,
+        position_error=norms[0] * output.flying,
+        attitude_error=norms[1] * output.flying,
+        tilt=tilt(estimate[ATTITUDE]),
+        arm_error=norms[2],
+        real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
+    )

@@ -390,7 +390,7 @@ class Flight:
 
 def _engine(name: str) -> Engine:
     if name == "direct":
-        from uam_lab.flights.direct.engine import fly as engine
+        from uam_lab.flights.direct.flight import fly as engine
     else:
         from uam_lab.flights.ros.engine import fly as engine
     return engine

@@ -5,33 +5,88 @@
 It releases all processes, devices and ports, also after an error.
 """
 
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from uam_lab.flights.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flights.observer import Observer
+from uam_lab.flights.operator import DECODE, NoFlight, Operator
+from uam_lab.flights.processes.guest import Guest
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.processes import NodeFailed
 from uam_lab.flights.rehearsal import device_figures, laboratory_process
 from uam_lab.flights.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
-from uam_lab.flights.rehearsal.starter import Starter
 from uam_lab.flights.ros import node_arguments, supervise
-from uam_lab.flights.ros.logged_outcome import logged
-from uam_lab.flights.ros.supervise import FlightRun
+from uam_lab.flights.ros.supervise import FlightRun, logged
 from uam_lab.flights.vehicle import vehicle_nodes
-from uam_lab.flights.vehicle.lab import Lab
-from uam_lab.flights.vehicle.lab_file import settings_of
+from uam_lab.flights.vehicle.lab_file import Lab, settings_of
 from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, known_json, write_json
-from uam_msgs_py.node import wiring
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import PASSED
+from uam_msgs_py.node import polling, wiring
+from uam_msgs_py.node.door import Door
 from uam_sim_bridge.nodes.laboratory import READY
 from uam_sim_bridge.ports import Reservation
+
+LOOK = 0.2  # [s] between two looks
+AGAIN = 1.0  # [s] between two requests to start
+PATIENCE = 60.0  # [s] without progress until the start counts as refused
+
+
+class Starter(threading.Thread):
+    """Context manager. `started`: the mission has accepted; `refused`: why not, "" while it tries.
+
+    `waits_for`: what it waits for now, one line.
+    """
+
+    def __init__(self, guest: Callable[[str], Guest], checklist: bool) -> None:
+        """guest: returns a node in the flight's ROS domain, by its name; checklist: wait for the
+        lists."""
+        super().__init__(name="starter", daemon=True)
+        self._guest, self._required = guest, checklist
+        self._ended = threading.Event()
+        self.started, self.refused, self.waits_for = False, "", "the nodes"
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self.join()
+
+    def run(self) -> None:
+        """Watch the lists, request the start."""
+        with self._guest("uam_rehearse") as guest:
+            lists = polling.listen(guest.node, topics.CHECKLIST)
+            operator, door = Operator(guest.node), Door(guest.node, tells=True)
+            passed, most = not self._required, -1
+            progress, asked = time.monotonic(), 0.0
+            while not self._ended.wait(LOOK) and not self.started:
+                now = time.monotonic()
+                for (_, state), items in door.decoded(lists, DECODE[topics.CHECKLIST]):
+                    passed, self.waits_for = passed or state.passed, state.summary
+                    count = sum(item.result == PASSED for item in items)
+                    if count > most:  # not those that come and go
+                        most, progress = count, now
+                if now - progress > PATIENCE:
+                    self.refused = self.waits_for
+                    return
+                if passed and now - asked >= AGAIN:
+                    asked = now
+                    try:
+                        self.started, self.waits_for = operator.command("start")
+                    except NoFlight as error:
+                        self.waits_for = str(error)
+
 
 REFUSED = "start refused: "
 LOGS = "logs"  # in the result folder

@@ -18,8 +18,7 @@ from uam_control.settings.atomic import write_text
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros.node_arguments import AUTOPILOT_WAIT, PX4_LOG, STAND_IN
-from uam_lab.flights.vehicle.lab import GPIO, Lab, LabError
-from uam_lab.flights.vehicle.lab_file import load_lab
+from uam_lab.flights.vehicle.lab_file import GPIO, Lab, LabError, load_lab
 from uam_lab.records.recording.logged_topics import LABORATORY_FILE
 from uam_sim_bridge.devices.mocap.calibration import FOLDER as CALIBRATIONS
 from uam_sim_bridge.faults import CABLE

@@ -25,9 +25,8 @@ from uam_lab.flights.observer import Observer
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.processes.processes import Processes
 from uam_lab.flights.ros import node_arguments, supervise
-from uam_lab.flights.ros.logged_outcome import read_outcome
 from uam_lab.flights.ros.process_fault_injection import ProcessFaults
-from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener
+from uam_lab.flights.ros.supervise import Course, FlightRun, StatusListener, read_outcome
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics

@@ -25,7 +25,11 @@ from uam_lab.flights.processes.process_table import await_orphans
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.flights.processes.shared_memory import shortage
 from uam_lab.flights.ros import FORKER, node_arguments
-from uam_lab.records.results.result_folder import ResultFolder
+from uam_lab.records.recording.log_reader import read_flight
+from uam_lab.records.recording.logged_topics import RECORDER, losses
+from uam_lab.records.recording.mcap_reader import UnreadableLog
+from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.result_folder import ResultFolder, known_json
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import WARN, AutopilotState, MissionStatus, diagnostic
@@ -295,3 +299,54 @@ def _watch(course: Course) -> None:
     observer.finish()
     if not course.flight.stop.raised:
         children.check()
+
+
+def read_outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+) -> Outcome:
+    """Return the outcome of the flight in `folder`; failure: the failed node, if any."""
+    logs, notes = folder.path / "logs", []
+    numbers = known_json(logs / "mujoco_sim.json")
+    realtime = settings.clock == "realtime"
+    late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+    if late and realtime:
+        notes.append(f"{late} of {total} setpoints were more than one control period late")
+    outcome = logged(settings, folder, failure, interrupted, notes)
+    if not outcome.errors_of:  # in simulation
+        outcome.wall_s = numbers.get("wall_s", 0.0)
+        if realtime:
+            outcome.latency_s = numbers.get("latency_s", [])
+            outcome.missed_ticks = numbers.get("missed_ticks")
+    if outcome.series is None or outcome.done or outcome.partial:
+        return outcome
+    full = known_json(logs / RECORDER).get("ended")
+    ended = full or numbers.get("ended_by")
+    if settings.dry_run and ended and not full:
+        outcome.abort_reason = f"dry run, {ended}: nothing was armed"
+    else:
+        outcome.failure = ended or "the log has no end of the mission"
+    return outcome
+
+
+def logged(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+    notes: list[str],
+) -> Outcome:
+    """Return what the log of a flight has; `notes` and the losses of the nodes come first."""
+    try:
+        outcome = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
+    except (UnreadableLog, OSError) as error:
+        why = error if folder.log.exists() else "the flight ended before the recorder began"
+        outcome = Outcome(series=None, failure=f"nothing recorded: {why}")
+    outcome.interrupted = interrupted
+    if failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    every = [*notes, *losses(folder.path / "logs"), *outcome.notes]
+    outcome.notes = list(dict.fromkeys(every))
+    return outcome

@@ -9,7 +9,7 @@ from functools import partial
 
 from uam_control.offboard.autopilot_magnet import ACTUATOR
 from uam_lab.flights.observer import STARTING, DeviceState
-from uam_lab.flights.vehicle.lab import AUTOPILOT, GPIO, Lab
+from uam_lab.flights.vehicle.lab_file import AUTOPILOT, GPIO, Lab
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import ERROR, STALE
 from uam_msgs_py.node import wiring

@@ -19,11 +19,10 @@ from uam_lab.flights.observer import Observer
 from uam_lab.flights.operator import NoFlight, Operator
 from uam_lab.flights.processes.interrupts import StopRequest
 from uam_lab.flights.ros import node_arguments, supervise
-from uam_lab.flights.ros.logged_outcome import read_outcome
-from uam_lab.flights.ros.supervise import Course, FlightRun
+from uam_lab.flights.ros.supervise import Course, FlightRun, read_outcome
 from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.devices import Report, devices
-from uam_lab.flights.vehicle.lab import Lab
+from uam_lab.flights.vehicle.lab_file import Lab
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics

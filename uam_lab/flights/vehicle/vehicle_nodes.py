@@ -9,7 +9,7 @@ from uam_lab.cockpit import page_address
 from uam_lab.flights.flight_options import ONLOOKERS
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros import node_arguments
-from uam_lab.flights.vehicle.lab import AUTOPILOT, GPIO, SERVO, Lab
+from uam_lab.flights.vehicle.lab_file import AUTOPILOT, GPIO, SERVO, Lab
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from uam_lab.preflight.checklist.limits import MotionLimits
-from uam_lab.preflight.checklist.motion_kinds import JointTurn, Shift, Turn
-from uam_lab.preflight.checklist.motion_step import MotionStep
+from uam_lab.preflight.checklist.motion_step import JointTurn, MotionStep, Shift, Turn
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, Step, StepState
 
 JOINT = "joint:"  # prefix of the steps of single joints

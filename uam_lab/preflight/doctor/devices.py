@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from uam_lab.flights.vehicle.devices import devices
-from uam_lab.flights.vehicle.lab import GPIO, Lab
+from uam_lab.flights.vehicle.lab_file import GPIO, Lab
 from uam_lab.preflight.doctor.finding import Finding, fail, ok
 from uam_sim_bridge.devices.dynamixel.bus import BusLost
 from uam_sim_bridge.devices.dynamixel.chain import ArmError

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 
-from uam_lab.flights.vehicle.lab import Lab
+from uam_lab.flights.vehicle.lab_file import Lab
 from uam_lab.preflight.doctor.finding import Finding, Verdict, fail
 
 # in the order of the report; each module has checks()

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_lab.records.results.hand_columns import ERROR
-from uam_lab.records.results.timeseries import Series
+from uam_lab.records.results.timeseries import ERROR, Series
 
 TRAJECTORY = "trajectory"  # phase of the scenario at its full speed
 WITH_RAMPS = ("run-up", TRAJECTORY, "run-out")

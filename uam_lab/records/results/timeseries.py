@@ -21,15 +21,37 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from uam_control.arm.hand import reach, shoulder
-from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
+from uam_control.arm.hand import HEADING, hands, reach, shoulder
+from uam_control.coordinates import ALPHA, ANGLES, CHI, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.motion.flatness import Flyer
+from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.settings.atomic import replacing
 from uam_control.vehicle import TWO_FINGER, VehicleDescription
-from uam_lab.records.results import hand_columns
-from uam_lab.records.results.hand_columns import TRUTH
+
+GROUPS = TRUTH, REFERENCE, ERROR = "end_effector", "end_effector_reference", "end_effector_error"
+COORDINATES = {"x": "m", "y": "m", "z": "m", "heading": "rad", "elevation": "rad"}
+
+
+def _hand_columns() -> dict[str, str]:
+    """Return the columns of the end effector: name → unit."""
+    return {f"{group}.{name}": unit for group in GROUPS for name, unit in COORDINATES.items()}
+
+
+def of_the_hand(
+    flyer: Flyer, truth: np.ndarray, reference: np.ndarray, swing: np.ndarray
+) -> np.ndarray:
+    """Return the columns (ticks, 15) in the order of `declared`.
+
+    truth: chi (ticks, 6 + n); reference (3, ticks, 6 + n): its attitude is replaced; swing
+    (ticks,) [rad]: of the hinge that a hand hangs on, NaN: unknown.
+    """
+    flattened(reference, flyer)
+    found, wanted = hands(flyer.chain, truth, swing), hands(flyer.chain, reference[CHI])
+    error = found - wanted
+    error[:, HEADING:] = wrap_angle(error[:, HEADING:])
+    return np.concatenate([found, wanted, error], axis=1)
+
 
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
@@ -66,7 +88,7 @@ def _declare(joints: int, rotors: int, hand: bool, fingers: bool) -> dict[str, s
     columns |= {"magnet.on": "1", "magnet.force": "N", "magnet.swing": "rad"}
     if fingers:
         columns |= {"gripper.opening": "m", "gripper.force": "N"}
-    return columns | hand_columns.declared() if hand else columns
+    return columns | _hand_columns() if hand else columns
 
 
 class Columns:
@@ -182,8 +204,8 @@ class FlightTable:
         if self._flyer is not None:
             rows = reference.reshape(len(values), -1, columns.size).swapaxes(0, 1).copy()
             swing = values[:, columns["magnet.swing"]]
-            hand = hand_columns.computed(self._flyer, chi, rows, swing)
-            values[:, columns.block(hand_columns.TRUTH)] = hand
+            hand = of_the_hand(self._flyer, chi, rows, swing)
+            values[:, columns.block(TRUTH)] = hand
             told["arm_reach_m"] = reach(self._flyer.chain, shoulder(self._flyer.chain))
         return Series(values, self.phases[: self.count], names, told, columns)
 

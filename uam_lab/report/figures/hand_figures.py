@@ -1,4 +1,4 @@
-"""The end effector: path against reference, error over time, workspace."""
+"""The end effector: path against reference, error over time, workspace; a joint's friction."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_lab.records.results.hand_columns import ERROR, REFERENCE, TRUTH
 from uam_lab.records.results.phase_errors import WITH_RAMPS
-from uam_lab.records.results.timeseries import Series
+from uam_lab.records.results.timeseries import ERROR, REFERENCE, TRUTH, Series
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight, Panel, corner_legend, flight_keys
+from uam_sim_bridge.devices.dynamixel.friction_fit import FrictionFit
 
 HEIGHT = 3.6  # [in]
 VIEWS = ("xy", "xz", "xyz")  # from above, from the side, in space
@@ -79,4 +79,29 @@ def draw_workspace(file: Path, name: str, places: np.ndarray) -> None:
             axes.set_ylabel(f"{up} [m]")
             axes.set_aspect("equal", adjustable="datalim")
         figure.suptitle(f"{name}: reach of the end effector; +: origin of the base")
+        style.save(figure, file)
+
+
+SHOWN = 4000  # dots
+
+
+def draw_friction(file: Path, joint: str, fit: FrictionFit) -> None:
+    """Write the picture as PNG."""
+    with style.styled():
+        figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+        axes = figure.subplots()
+        every = max(1, len(fit.velocity) // SHOWN)
+        dots = {"color": style.FLIGHTS[0], "markersize": 2, "label": "measured"}
+        axes.plot(fit.velocity[::every], fit.torque[::every], ".", **dots)
+        fastest = float(np.max(np.abs(fit.velocity)))
+        label = f"{fit.coulomb:.3f} N m and {fit.viscous:.4f} N m s/rad"
+        for speeds in (np.array([-fastest, -1e-6]), np.array([1e-6, fastest])):
+            fitted = fit.coulomb * np.sign(speeds) + fit.viscous * speeds
+            axes.plot(speeds, fitted, color=style.INK, linewidth=1.5, label=label)
+            label = None
+        scale = f"torque scale {fit.scale:.3f}" if fit.scale_known else "torque scale unknown"
+        axes.set_title(f"{joint}: friction, {scale}", loc="left")
+        axes.set_xlabel("velocity [rad/s]")
+        axes.set_ylabel("torque without weight and inertia [N m]")
+        axes.legend()
         style.save(figure, file)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,11 +14,69 @@ from matplotlib.ticker import MaxNLocator
 
 from uam_lab.records.results.timeseries import ON_GROUND, Series
 from uam_lab.report.facts import parameter_table
-from uam_lab.report.figures import fault_marks, style
+from uam_lab.report.facts.parameter_table import text, together
+from uam_lab.report.figures import style
 
 if TYPE_CHECKING:
     from uam_lab.analysis.stability import Stability
     from uam_lab.report.facts.px4_log import Px4Log
+
+APART = 0.02  # of the time axis; closer letters share one place
+SHADE = 0.16  # opacity
+LETTER = {"fontsize": 7.0, "fontweight": "bold", "color": style.FAULT}
+
+
+@dataclass(frozen=True)
+class FaultMark:
+    """One fault: its letter in the figures, name, mission times [s], parameters."""
+
+    letter: str
+    name: str
+    begin: float
+    end: float | None  # None: active until the end of the flight
+    values: tuple[tuple[str, str], ...]
+
+
+def fault_rows(info: Mapping[str, Any]) -> list[FaultMark]:
+    """Return every fault of a flight, in order; info: with `faults` as in metrics.json."""
+    return [
+        FaultMark(
+            letter=letter(number),
+            name=one["fault"],
+            begin=one["begin_s"],
+            end=one["end_s"],
+            values=tuple((name, text(value)) for name, value in one["parameters"].items()),
+        )
+        for number, one in enumerate(info.get("faults") or [])
+    ]
+
+
+def letter(number: int) -> str:
+    """Return A, B ... Z, AA, AB ... for 0, 1 ..."""
+    first, last = divmod(number, 26)
+    return (letter(first - 1) if first else "") + chr(ord("A") + last)
+
+
+def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -> None:
+    """Shade the time span of each fault in all panels, with its letter in the top row."""
+    shown = [row for row in fault_rows(info) if row.begin <= end and (row.end or end) >= start]
+    for row in shown:
+        begin, over = max(row.begin, start), min(end if row.end is None else row.end, end)
+        for axis in axes.flat:
+            axis.axvspan(begin, over, color=style.FAULT, alpha=SHADE, linewidth=0.0, zorder=0.5)
+            axis.axvline(begin, color=style.FAULT, linewidth=0.8, zorder=2.3)
+    marks = sorted((max(row.begin, start), row.letter) for row in shown)
+    for axis in axes[0]:
+        for at, letters in together(marks, APART * (end - start)):
+            style.note(axis, " ".join(letters), (at, 0.0), (2, 2), **LETTER)
+
+
+def fault_handles(info: Mapping[str, Any]) -> list[Line2D]:
+    """Return the legend entry of the faults, if there are any."""
+    if not fault_rows(info):
+        return []
+    return [style.key("fault", style.FAULT, 6.0, alpha=2.0 * SHADE)]
+
 
 BUCKETS = 900  # about one per pixel column of a panel
 RIGHT = 0.985  # right edge of the panels as part of the width
@@ -153,7 +211,7 @@ def finish(
         for time, colour, _ in events(first):
             axis.axvline(time, color=colour, linewidth=0.9, linestyle=MAGNET_DASHES, zorder=2.5)
     mark_changes(axes, first, start, end)
-    fault_marks.shade(axes, first.info, start, end)
+    shade(axes, first.info, start, end)
     for axis in axes[0]:
         phase_names(figure, axis, first, start, end)
     for axis in axes[-1]:
@@ -202,8 +260,8 @@ def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> 
                 zorder=2.4,
             )
     for axis in axes[0]:
-        for time, text in parameter_table.labels(shown, apart=0.02 * (end - start)):
-            style.note(axis, text, (time, 1.0), (2, -2), **CHANGE)
+        for time, label in parameter_table.labels(shown, apart=0.02 * (end - start)):
+            style.note(axis, label, (time, 1.0), (2, -2), **CHANGE)
 
 
 def events(series: Series) -> list[tuple[float, str, str]]:
@@ -228,7 +286,7 @@ def legend(
         for accepted, colour, dashes, name in CHANGES
         if accepted in results
     ]
-    handles += fault_marks.handles(flights[0].series.info)
+    handles += fault_handles(flights[0].series.info)
     corner_legend(figure, handles)
 
 

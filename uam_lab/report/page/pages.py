@@ -11,7 +11,7 @@ from uam_lab.records.results import templates
 from uam_lab.records.results.metrics import PASSED_ON, errors
 from uam_lab.records.results.result_folder import LOG, PX4_LOG, TABLE, read_json
 from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows
-from uam_lab.report.figures import fault_marks, figures
+from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.figures.zoomable import library
@@ -66,7 +66,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         phase_headings=flight_summary.PHASE_HEADINGS,
         clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
         changes=parameter_table.rows(info),
-        faults=fault_marks.rows(info),
+        faults=panels.fault_rows(info),
         facts=[
             (label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS.items()
         ],
