@@ -29,6 +29,7 @@ from uam_lab.records.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.flight_events import ParameterChange
+from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.node.namespace import expanded
 
@@ -76,9 +77,8 @@ def test_wall_times_belong_to_their_stamps_where_two_layouts_come_mixed():
     assert pairs == {0: 10, 1000: 11, 2000: 12, 3000: 13}
 
 
-def written(path, *names):
+def written(path, *names, kind="sensor_msgs/msg/JointState"):
     """Write a log with one message on each topic."""
-    kind = "sensor_msgs/msg/JointState"
     log = BoundedLog(path, 0.0)
     for name in names:
         channel = log.add_channel(name, kind, schema(kind), {})
@@ -101,9 +101,22 @@ def test_a_log_of_two_vehicles_is_refused(tmp_path):
 
 
 def test_a_message_that_is_none_is_refused_in_one_line(tmp_path):
-    log = Log.read(written(tmp_path / "log.mcap", f"/{topics.THRUST.name}"))
-    with pytest.raises(UnreadableLog, match=f"message of {topics.THRUST.name} is damaged"):
-        log.blocks(topics.THRUST)
+    kind = type_name(topics.STATE.type)
+    log = Log.read(written(tmp_path / "log.mcap", f"/{topics.STATE.name}", kind=kind))
+    with pytest.raises(
+        UnreadableLog, match=f"log.mcap: a message of {topics.STATE.name} is damaged"
+    ):
+        log.blocks(topics.STATE)
+
+
+@pytest.mark.parametrize("kind", ["std_msgs/msg/String", "sensor_msgs/msg/Imu"])
+def test_a_log_of_another_program_is_refused_with_the_type(tmp_path, kind):
+    path = written(tmp_path / "log.mcap", f"/{topics.REFERENCE.name}", kind=kind)
+    with pytest.raises(UnreadableLog, match=f"log.mcap: uam/reference has the type {kind} in"):
+        log_reader.read_flight(path, load_scenario("hover"))
+    empty = written(tmp_path / "empty.mcap")
+    with pytest.raises(UnreadableLog, match="empty.mcap has no reference"):
+        log_reader.read_flight(empty, load_scenario("hover"))
 
 
 SECOND = 1_000_000_000

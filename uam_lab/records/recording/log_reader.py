@@ -64,7 +64,7 @@ class References:
                 if flown.any():
                     self.takeoff = int(np.min((block.stamps - since)[flown]))
         if not stamps:
-            raise UnreadableLog("the log has no reference: the mission did not start")
+            raise UnreadableLog(f"{log.name} has no reference: the mission did not start")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
         self.samples = StampedRows(np.concatenate(stamps), joined)
         self._hold_after_landing(size)

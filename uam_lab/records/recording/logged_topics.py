@@ -15,7 +15,7 @@ from uam_lab.records.results.result_folder import known_json
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_switch
 from uam_msgs_py.messages.layouts import STAMP, BadMessage, Layout, Layouts
-from uam_msgs_py.messages.serialized import deserialized
+from uam_msgs_py.messages.serialized import deserialized, type_name
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.namespace import expanded
@@ -105,13 +105,18 @@ class StampedRows:
 class Log:
     """The topics of one vehicle in a log, decoded on request.
 
-    found: by name; namespace: of the vehicle's nodes; notes: lines about what cannot be read.
+    found: by name; namespace: of the vehicle's nodes; notes: lines about what cannot be read;
+    name: of the log in errors.
     """
 
     def __init__(
-        self, found: Mapping[str, TopicLog], namespace: str = "/", notes: Sequence[str] = ()
+        self,
+        found: Mapping[str, TopicLog],
+        namespace: str = "/",
+        notes: Sequence[str] = (),
+        name: str = "the log",
     ):
-        self.notes = [*notes]
+        self.notes, self.name = [*notes], name
         self._topics = {
             topic: found[name]
             for topic in TOPICS
@@ -132,7 +137,7 @@ class Log:
         spaces = {name.removesuffix(one) for name in found for one in states if name.endswith(one)}
         if len(spaces) > 1:
             raise UnreadableLog(f"{path} has several vehicles: {', '.join(sorted(spaces))}")
-        return cls(found, spaces.pop() if spaces else "/", notes)
+        return cls(found, spaces.pop() if spaces else "/", notes, str(path))
 
     def messages(self, topic: Topic) -> list[bytes]:
         """Return the serialized messages of a topic in file order; may be empty."""
@@ -164,13 +169,24 @@ class Log:
         """
         made = self._blocks.get(topic)
         if made is None:
-            log = self._topics.get(topic)
-            try:
-                made = read_blocks(log.type_name, log.messages) if log and log.messages else []
-            except BadMessage as error:
-                raise UnreadableLog(f"a message of {topic.name} is damaged: {error}") from None
-            self._blocks[topic] = made
+            made = self._blocks[topic] = self._decoded(topic)
         return made
+
+    def _decoded(self, topic: Topic) -> list[Block]:
+        log, needed = self._topics.get(topic), type_name(topic.type)
+        if log is None or not log.messages:
+            return []
+        if log.type_name != needed:
+            raise UnreadableLog(
+                f"{self.name}: {topic.name} has the type {log.type_name} in place of {needed}: "
+                "this is no log of this program, or of another version"
+            )
+        try:
+            return read_blocks(log.type_name, log.messages)
+        except BadMessage as error:
+            raise UnreadableLog(
+                f"{self.name}: a message of {topic.name} is damaged: {error}"
+            ) from None
 
     def samples(self, topic: Topic, fields: Sequence[str], width: int) -> StampedRows:
         """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""
