@@ -146,7 +146,7 @@ def broken_estimate(one):
 
 def storm(one):
     """Blow the vehicle away: limits are exceeded."""
-    one.plant.arrays.physics.wind_mean[:] = 14.0, 0.0, 0.0
+    one.plant.body.wind_mean[:] = 14.0, 0.0, 0.0
 
 
 def hold(one):

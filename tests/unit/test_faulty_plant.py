@@ -273,7 +273,7 @@ def test_wind_comes_softly_and_goes():
     while plant.time < 0.4:
         plant.sense()
         plant.step(HOVER, np.zeros(2), False)
-        winds[round(plant.time, 3)] = plant.physics.wind.copy()
+        winds[round(plant.time, 3)] = plant.physics.body.wind.copy()
     np.testing.assert_allclose(winds[0.1], 0.0)
     np.testing.assert_allclose(winds[0.152], [0.0, 4.0, -0.5], atol=0.3)
     np.testing.assert_allclose(winds[0.296], [0.0, 8.0, -1.0], atol=1e-9)
@@ -289,7 +289,9 @@ def test_gusts_go_on_around_the_wind_that_a_fault_adds():
     added.timeline.mission_at(0.0, 0.0, "take-off")
     run(usual, 0.4)
     run(added, 0.4)
-    np.testing.assert_allclose(added.physics.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(
+        added.physics.body.wind - usual.body.wind, [5.0, 0.0, 0.0], atol=1e-9
+    )
 
 
 def test_nothing_happens_before_the_mission_begins():
@@ -309,15 +311,15 @@ def lifted(text, until=1.5):
     """
     faulty = plant_with(text)
     plant = faulty.physics
-    plant._alpha[:] = 0.0
-    plant._swing_angle[:] = 0.0
+    plant.body.alpha[:] = 0.0
+    plant.body.swing[:] = 0.0
     base = np.array([0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0])
     face = 2.0 - 0.073 - 0.100 - 0.140 - 0.030
-    plant._payload_pose[:] = [0.0, 0.0, face - 0.0205, 1.0, 0.0, 0.0, 0.0]
+    plant.body.payload[:] = [0.0, 0.0, face - 0.0205, 1.0, 0.0, 0.0, 0.0]
     rows = []
     while plant.time < until - 1e-9:
-        plant._position[:], plant._quaternion[:] = base[:3], base[3:]
-        plant._velocity[:] = plant._rates[:] = 0.0
+        plant.body.position[:], plant.body.quaternion[:] = base[:3], base[3:]
+        plant.body.velocity[:] = plant.body.rates[:] = 0.0
         faulty.sense()
         faulty.step(np.zeros(4), np.zeros(2), plant.time < 1.0)
         rows.append((plant.time, plant.truth()))

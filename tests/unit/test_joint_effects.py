@@ -36,7 +36,7 @@ def test_teeth_of_a_light_joint_are_as_soft_as_the_physics_step_needs():
         '<inertial pos="0 0 0" mass="0.1" diaginertia="1e-12 1e-12 1e-12"/>'
         "</body></worldbody></mujoco>"
     )
-    bench = SimpleNamespace(model=model, data=mujoco.MjData(model), arm_dofs=slice(0, 1))
+    bench = SimpleNamespace(model=model, data=mujoco.MjData(model), arm=slice(0, 1))
     (teeth,) = followed(bench, np.array([0.5e-3]), 150.0, 0.3)
     assert teeth == pytest.approx(3.0 / 5.4, rel=1e-6)
     assert followed(bench, np.array([0.5e-3]), 15.0, 0.03)[0] == 1.0
@@ -108,9 +108,9 @@ def test_a_joint_with_play_swings_freely_within_it():
 def test_cables_pull_to_their_rest_angle():
     one = plant("cable_torque:stiffness=0.02,stiffness_spread=0,rest_spread_deg=0")
     bench = one.effects.bench
-    bench.angles[:] = [0.5, math.radians(90.0) - 0.25]
+    bench.body.alpha[:] = [0.5, math.radians(90.0) - 0.25]
     tick(one, "cable_torque")
-    assert one.data.qfrc_applied[bench.arm_dofs] == pytest.approx([-0.01, 0.005])
+    assert one.data.qfrc_applied[bench.arm] == pytest.approx([-0.01, 0.005])
 
 
 def test_the_current_loop_s_noise_has_its_size_and_bandwidth_at_every_joint():

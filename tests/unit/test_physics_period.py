@@ -25,7 +25,7 @@ VEHICLES = {name: Vehicle.of(load_description(name)) for name in ("s500_arm3", "
 
 def one_by_one(plant, motors, effort, magnet):
     """As `MujocoPlant.step`, with MuJoCo's own step."""
-    arrays, steps = plant.arrays.physics, plant.memory["steps"].item()
+    arrays, steps = plant.body, plant.memory["steps"].item()
     begin_period(arrays, effort, magnet, np.zeros(3), plant.tick)
     for _ in range(steps):
         actuate(arrays, motors)

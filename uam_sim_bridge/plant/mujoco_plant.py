@@ -18,13 +18,12 @@ from uam_sim_bridge.plant.magnet import NO_MAGNET, PayloadHinge, add_to, magnet_
 from uam_sim_bridge.plant.observation import (
     REAL,
     WHOLE,
-    Observed,
     PlantArrays,
     sense,
     step,
     write_truth,
 )
-from uam_sim_bridge.plant.physics import PhysicsArrays
+from uam_sim_bridge.plant.physics import Body
 from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
 from uam_sim_bridge.plant.sensors import (
     BLOCK,
@@ -44,7 +43,7 @@ STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's 
 class MujocoPlant(Plant):
     """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/.
 
-    `arrays`: all that compiled functions use, never replaced.
+    `arrays`: all that compiled functions use, `body`: the vehicle's; never replaced.
     """
 
     HAS_EFFECTS = True
@@ -66,37 +65,36 @@ class MujocoPlant(Plant):
         self.model = model = vehicle.compile(payload_mass, add_to if hinged else None)
         self.data = data = mujoco.MjData(model)
         self._steps = round(self.period / model.opt.timestep)
-        self._lay_out(payload_mass, arm_start or vehicle.description.stowed)
+        start = np.array(arm_start or vehicle.description.stowed, dtype=float)
+        plate, sensors = model.geom("payload_plate"), numbers["sensors"]
 
-        scale = numbers["sensors"]["noise_scale"]
+        scale = sensors["noise_scale"]
         imu_noise, mocap_noise, gusts, payload_noise = generators(seed, 4)
-        sensors = numbers["sensors"]
         self._imu = Imu(sensors["imu"], scale, imu_noise)
-        noises = mocap_noise, payload_noise
-        self._mocap = Mocap(sensors["mocap"], scale, noises, self._payload_top)
-        self._encoder_units = encoder_units(sensors["joints"])
-
+        noises, payload_top = (mocap_noise, payload_noise), float(plate.pos[2] + plate.size[2])
+        self._mocap = Mocap(sensors["mocap"], scale, noises, payload_top)
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
-        self.servos = Servos(numbers["servos"], self._alpha)
+        self.servos = Servos(numbers["servos"], start)
+        self._fingers = Fingers(model, data, numbers.get("gripper"))
+        self._fingers.pace(self.period)
         air = numbers["air"]
-        self._drag = np.array(air["drag"], dtype=float)
-        self._wind_mean = np.array(air["wind"], dtype=float)
-        self.wind = self._wind_mean.copy()
         keep = np.exp(-self.period / air["gust_time"])
-        self._gust_keep = np.array([keep])
-        spread = air["gust"] * np.sqrt(1.0 - keep**2)
-        self._gust = Noise(gusts, np.full(3, spread))
+        self._gust = Noise(gusts, np.full(3, air["gust"] * np.sqrt(1.0 - keep**2)))
+        self.body = self._lay_out(payload_mass, start, keep)
+        base = model.joint(BASE).dofadr[0]
+        self._push = data.qfrc_applied[base : base + 6]
 
         mujoco.mj_forward(model, data)
-        self._specific_force = self._sensed_force.copy()
+        self.body.specific_force[:] = self.body.sensed_force
         self._drawn, self._observed = range(0), -1  # ticks that have noise, newest observed one
         self._added_wind = np.zeros(3)  # by disturbances
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
         self._hinge = PayloadHinge(model, data) if hinged else None
-        self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
-        self.effects = ActingEffects(numbers["effects"], self._bench(), seed)
+        bench = Bench(vehicle, model, data, self.rotors, self._mocap, self.body)
+        self.effects = ActingEffects(numbers["effects"], bench, seed)
         self._unused_truth = np.empty(self.truth_row.width)
         self._prepare(air["gust"] > 0.0)
+        self._arm_dofs = bench.arm
         self._undisturbed = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
@@ -104,105 +102,71 @@ class MujocoPlant(Plant):
             self.magnet_gain,
         )
 
-    def _lay_out(self, payload_mass: float, arm_start: Sequence[float]) -> None:
-        """Store views into MuJoCo's arrays and set the initial pose."""
-        data, joint, described = self.data, self.model.joint, self.vehicle.description
-        base_q, base_v = joint(BASE).qposadr[0], joint(BASE).dofadr[0]
-        self._position = data.qpos[base_q : base_q + 3]
-        self._quaternion = data.qpos[base_q + 3 : base_q + 7]
-        self._velocity = data.qvel[base_v : base_v + 3]
-        self._rates = data.qvel[base_v + 3 : base_v + 6]
-        first, names = described.joint_names[0], described.joint_names
-        arm_q, arm_v = joint(first).qposadr[0], joint(first).dofadr[0]
+    def _lay_out(self, payload_mass: float, start: np.ndarray, gust_keep: float) -> Body:
+        """Set the initial pose; return the arrays. start (n,) [rad]: joint angles."""
+        data, model, described = self.data, self.model, self.vehicle.description
+        joint, names = model.joint, described.joint_names
         self._in_a_row("joint", [joint(name).dofadr[0] for name in names])
-        self._alpha = data.qpos[arm_q : arm_q + self.joints]
-        self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
-        self._push = data.qfrc_applied[base_v : base_v + 6]
-        payload_q = joint(PAYLOAD).qposadr[0]
-        self._payload_pose = data.qpos[payload_q : payload_q + 7]
-        self._payload_position = self._payload_pose[0:3]
-        plate = self.model.geom("payload_plate")
-        self._payload_top = float(plate.pos[2] + plate.size[2])
-        sensed = self.model.sensor("specific_force").adr[0]
-        self._sensed_force = data.sensordata[sensed : sensed + 3]
-        self._thrust_control = self._controls(described.rotor_names)
-        self._torque_control = self._controls(names)
-        self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
-        # of the same instant as the face: qpos is a physics step later
-        self._payload_centre = data.xpos[self.model.body(PAYLOAD).id]
-        self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
-        self._alpha[:] = arm_start
-        self._lay_out_magnet(-sum(arm_start))
-        self._fingers = Fingers(self.model, data, self.vehicle.numbers.get("gripper"))
-        self._fingers.pace(self.period)
-        self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
+        (base_q, base_v), (arm_q, arm_v), (payload_q, _) = (
+            (joint(name).qposadr[0], joint(name).dofadr[0]) for name in (BASE, names[0], PAYLOAD)
+        )
+        arm = slice(arm_v, arm_v + self.joints)
+        sensed = model.sensor("specific_force").adr[0]
+        alpha, payload = data.qpos[arm_q:][: self.joints], data.qpos[payload_q : payload_q + 7]
+        air = self.vehicle.numbers["air"]
+        alpha[:] = start
+        payload[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # moved far away: the model stays the same
-            self._payload_position[:] = (5.0, 5.0, 0.02)
-
-    def _lay_out_magnet(self, level: float) -> None:
-        """Store views of the magnet, which hangs at an angle [rad]; zeros without a magnet."""
-        self.magnet_gain, self._magnet_control = 0.0, np.zeros(1)
-        self._face, self._magnet_constants = np.zeros(3), NO_MAGNET
-        self._swing_angle = np.zeros(1)
-        if not self.vehicle.description.has_magnet:
-            return
-        swing, magnet = self.model.joint(SWING).qposadr[0], self.vehicle.numbers["magnet"]
-        self._swing_angle = self.data.qpos[swing : swing + 1]
-        self._swing_angle[:] = level
-        self._face = self.data.site_xpos[self.model.site(FACE).id]
-        self.magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
-        self._magnet_control = self._controls((MAGNET,))
-        curve = magnet.get("curve", ())
-        self._magnet_constants = magnet_constants(self.model, magnet["gap_scale"], curve)
-
-    def _physics_arrays(self) -> PhysicsArrays:
-        return PhysicsArrays(
+            payload[0:3] = (5.0, 5.0, 0.02)
+        return Body(
             rotors=self.rotors.arrays,
-            thrust_control=self._thrust_control,
             servos=self.servos.arrays,
-            angles=self._alpha,
-            joint_rates=self._alpha_dot,
-            torque_control=self._torque_control,
-            drag=self._drag,
-            velocity=self._velocity,
-            wind=self.wind,
-            wind_mean=self._wind_mean,
-            gust_keep=self._gust_keep,
-            force=self._force_on_base,
-            face=self._face,
-            payload=self._payload_centre,
-            payload_axes=self._payload_axes,
-            gap_constants=self._magnet_constants,
-            magnet_control=self._magnet_control,
+            position=data.qpos[base_q : base_q + 3],
+            quaternion=data.qpos[base_q + 3 : base_q + 7],
+            velocity=data.qvel[base_v : base_v + 3],
+            rates=data.qvel[base_v + 3 : base_v + 6],
+            alpha=alpha,
+            alpha_dot=data.qvel[arm],
+            base_acceleration=data.qacc[base_v : base_v + 6],
+            alpha_ddot=data.qacc[arm],
+            sensed_force=data.sensordata[sensed : sensed + 3],
+            specific_force=np.zeros(3),
+            thrust_control=self._controls(described.rotor_names),
+            torque_control=self._controls(names),
+            force=data.xfrc_applied[model.body(BASE).id, 0:3],
+            drag=np.array(air["drag"], dtype=float),
+            wind=np.array(air["wind"], dtype=float),
+            wind_mean=np.array(air["wind"], dtype=float),
+            gust_keep=np.array([gust_keep]),
+            payload=payload,
+            # of the same instant as the face: qpos is a physics step later
+            payload_centre=data.xpos[model.body(PAYLOAD).id],
+            payload_axes=data.xmat[model.body(PAYLOAD).id],
+            **self._magnet_arrays(-start.sum()),
             finger_ends=self._fingers.ends,
             finger_goal=self._fingers.goal,
-            sensed_force=self._sensed_force,
-            specific_force=self._specific_force,
-        )
-
-    def _observed_arrays(self) -> Observed:
-        data, names = self.data, self.vehicle.description.joint_names
-        base, arm = (self.model.joint(name).dofadr[0] for name in (BASE, names[0]))
-        return Observed(
-            position=self._position,
-            quaternion=self._quaternion,
-            velocity=self._velocity,
-            rates=self._rates,
-            alpha=self._alpha,
-            alpha_dot=self._alpha_dot,
-            base_acceleration=data.qacc[base : base + 6],
-            alpha_ddot=data.qacc[arm : arm + self.joints],
-            specific_force=self._specific_force,
-            imu_bias=self._imu.bias,
-            servo_torque=self.servos.torque,
-            encoder_units=self._encoder_units,
-            rotor_thrust=self.rotors.thrust,
-            payload=self._payload_pose,
-            magnet_control=self._magnet_control,
-            swing=self._swing_angle,
             opening=self._fingers.opening,
             grip_force=self._fingers.force,
+            imu_bias=self._imu.bias,
+            encoder_units=encoder_units(self.vehicle.numbers["sensors"]["joints"]),
         )
+
+    def _magnet_arrays(self, level: float) -> dict[str, np.ndarray]:
+        """Return those of a magnet, which hangs at an angle [rad]; zeros without a magnet."""
+        self.magnet_gain, model, data = 0.0, self.model, self.data
+        if not self.vehicle.description.has_magnet:
+            none = {"face": np.zeros(3), "gap_constants": NO_MAGNET}
+            return none | {"magnet_control": np.zeros(1), "swing": np.zeros(1)}
+        at, magnet = model.joint(SWING).qposadr[0], self.vehicle.numbers["magnet"]
+        swing = data.qpos[at : at + 1]
+        swing[:] = level
+        self.magnet_gain = float(model.actuator(MAGNET).gainprm[0])
+        return {
+            "face": data.site_xpos[model.site(FACE).id],
+            "gap_constants": magnet_constants(model, magnet["gap_scale"], magnet.get("curve", ())),
+            "magnet_control": self._controls((MAGNET,)),
+            "swing": swing,
+        }
 
     def _prepare(self, gusty: bool) -> None:
         """Collect the arrays; look up the machine code of what each tick calls."""
@@ -214,7 +178,7 @@ class MujocoPlant(Plant):
             *(self.period, self.magnet_gain),
         )
         self.arrays = a = PlantArrays(
-            *(self._physics_arrays(), self._observed_arrays(), self.truth_row),
+            *(self.body, self.truth_row),
             *(self._imu.noise.arrays, self._gust.arrays, self._mocap.arrays, self.effects.arrays),
             np.zeros((max(late) + 1, 8 + 3 * self.joints)),
             np.full(max(late) + 1, np.iinfo(np.int64).min),
@@ -223,24 +187,7 @@ class MujocoPlant(Plant):
         truth = self._unused_truth
         self._sense = bound(sense, a, truth)
         self._step = bound(step, a, motors, np.empty(self.joints), True)
-        self._write_truth = prepared(write_truth, a.observed, 1.0, a.truth, truth)
-
-    def _bench(self) -> Bench:
-        """Return the parts on which effects act."""
-        first = self.vehicle.description.joint_names[0]
-        return Bench(
-            vehicle=self.vehicle,
-            model=self.model,
-            data=self.data,
-            rotors=self.rotors,
-            mocap=self._mocap,
-            period=self.period,
-            arm=(self.model.joint(first).dofadr[0], self.joints),
-            torque_control=self._torque_control,
-            encoder_units=self._encoder_units,
-            sample=np.empty(8 + 3 * self.joints),
-            pose=self._mocap.arrays.taken[VEHICLE_POSE],
-        )
+        self._write_truth = prepared(write_truth, self.body, 1.0, a.truth, truth)
 
     def _controls(self, names: Sequence[str]) -> np.ndarray:
         """Return a view (len(names),) of the controls of these actuators."""
@@ -335,8 +282,8 @@ class MujocoPlant(Plant):
         if self.vehicle.description.has_magnet:
             model.actuator_gainprm[model.actuator(MAGNET).id, 0] = self.magnet_gain
         change = disturbance.wind - self._added_wind
-        self.wind += change
-        self._wind_mean += change
+        self.body.wind[:] += change
+        self.body.wind_mean[:] += change
         self._added_wind += change
         self._swing_rate = disturbance.payload_swing
 
@@ -360,10 +307,10 @@ class MujocoPlant(Plant):
 
     def truth(self) -> Truth:
         at, row = self.truth_row, np.empty(self.truth_row.width)
-        self._write_truth(self.arrays.observed, self.magnet_gain, at, row)
+        self._write_truth(self.body, self.magnet_gain, at, row)
         return Truth(
             row[: at.rotor_thrust].reshape(3, -1),
-            self._quaternion.copy(),
+            self.body.quaternion.copy(),
             row[at.payload : at.payload + 3],
             row[at.payload + 3 : at.magnet],
             float(row[at.magnet]),

@@ -14,7 +14,7 @@ from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.effects.acting_effects import EffectArrays
 from uam_sim_bridge.plant.engine_step import mj_step
 from uam_sim_bridge.plant.gripper import write_grip
-from uam_sim_bridge.plant.physics import PhysicsArrays, actuate, average, begin_period
+from uam_sim_bridge.plant.physics import Body, actuate, average, begin_period
 from uam_sim_bridge.plant.plant import TruthRow
 from uam_sim_bridge.plant.sensors import (
     PAYLOAD_POSE,
@@ -30,40 +30,9 @@ from uam_sim_bridge.plant.sensors import (
 )
 
 
-class Observed(NamedTuple):
-    """What is observed, as arrays that never move; most are views into MuJoCo's.
-
-    position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
-    FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
-    [m/s^2, ENU] and angular [rad/s^2, FLU]. specific_force (3,) [m/s^2, FLU], imu_bias (6,):
-    [rad/s, m/s^2]; servo_torque (n,) [N m]; encoder_units (2,): see `quantised`. rotor_thrust
-    (rotors,) [N]; payload (7,): position [m] and quaternion; magnet_control (1,): part of the
-    holding force; swing (1,) [rad]: angle of the magnet's pivot. opening, grip_force: of `Fingers`.
-    """
-
-    position: np.ndarray
-    quaternion: np.ndarray
-    velocity: np.ndarray
-    rates: np.ndarray
-    alpha: np.ndarray
-    alpha_dot: np.ndarray
-    base_acceleration: np.ndarray
-    alpha_ddot: np.ndarray
-    specific_force: np.ndarray
-    imu_bias: np.ndarray
-    servo_torque: np.ndarray
-    encoder_units: np.ndarray
-    rotor_thrust: np.ndarray
-    payload: np.ndarray
-    magnet_control: np.ndarray
-    swing: np.ndarray
-    opening: np.ndarray
-    grip_force: np.ndarray
-
-
 @borrowing
 def observe(
-    o: Observed,
+    o: Body,
     noise: np.ndarray,
     samples: np.ndarray,
     magnet_gain: float,
@@ -81,18 +50,18 @@ def observe(
         o.alpha, o.alpha_dot, o.encoder_units, samples[angles:speeds], samples[speeds:torques]
     )
     for i in range(joints):
-        samples[torques + i] = o.servo_torque[i]
+        samples[torques + i] = o.servos.torque[i]
     write_grip(o.opening, o.grip_force, samples[torques + joints :])
     write_truth(o, magnet_gain, at, truth)
 
 
 @borrowing
-def write_truth(o: Observed, magnet_gain: float, at: TruthRow, row: np.ndarray) -> None:
+def write_truth(o: Body, magnet_gain: float, at: TruthRow, row: np.ndarray) -> None:
     """Write the true values to row (at.width,); magnet_gain [N]: full holding force."""
     size = ALPHA + len(o.alpha)
     write_state(o, row[at.state : at.state + 3 * size].reshape((3, size)))
-    for i in range(len(o.rotor_thrust)):
-        row[at.rotor_thrust + i] = o.rotor_thrust[i]
+    for i in range(len(o.rotors.thrust)):
+        row[at.rotor_thrust + i] = o.rotors.thrust[i]
     for i in range(7):
         row[at.payload + i] = o.payload[i]
     row[at.magnet] = o.magnet_control[0] * magnet_gain
@@ -101,7 +70,7 @@ def write_truth(o: Observed, magnet_gain: float, at: TruthRow, row: np.ndarray) 
 
 
 @jit
-def write_state(o: Observed, state: np.ndarray) -> None:
+def write_state(o: Body, state: np.ndarray) -> None:
     """Write chi, chi_dot, chi_ddot into state (3, 6 + n), see uam_control.coordinates."""
     euler = euler_from_quaternion(o.quaternion)
     for i in range(3):
@@ -118,8 +87,7 @@ class PlantArrays(NamedTuple):
     """State of a `MujocoPlant`. samples (m, 8 + 3 n): of IMU, joints and gripper, in a ring by the
     tick at which they were taken, taken (m,); numbers (1,): see WHOLE, REAL."""
 
-    physics: PhysicsArrays
-    observed: Observed
+    body: Body
     truth: TruthRow
     imu_noise: NoiseArrays
     gusts: NoiseArrays
@@ -143,7 +111,7 @@ def take_samples(a: PlantArrays, truth: np.ndarray) -> None:
     row = m.tick % len(a.samples)
     noise = a.imu_noise.rows[next_row(a.imu_noise)]
     sample = a.effects.row
-    observe(a.observed, noise, sample, m.magnet_gain, a.truth, truth)
+    observe(a.body, noise, sample, m.magnet_gain, a.truth, truth)
     call_all(a.effects.sample)
     put(sample, a.samples[row])
     a.taken[row] = m.tick
@@ -152,7 +120,7 @@ def take_samples(a: PlantArrays, truth: np.ndarray) -> None:
 @borrowing
 def take_due_pose(a: PlantArrays) -> bool:
     """Take the next pose if it is due, see `take_pose`."""
-    m, o = a.numbers[0], a.observed
+    m, o = a.numbers[0], a.body
     place = o.position, o.quaternion, o.velocity, o.rates, o.payload
     return take_pose(a.mocap, m.tick * m.period, m.period, *place)
 
@@ -187,17 +155,17 @@ def affect(e: EffectArrays, efficiency: np.ndarray) -> None:
 @borrowing
 def step(a: PlantArrays, motors: np.ndarray, arm_command: np.ndarray, magnet: bool) -> int:
     """Advance the physics by a period, as `MujocoPlant.step`; return 0 or an error's address."""
-    m, physics = a.numbers[0], a.physics
+    m, body = a.numbers[0], a.body
     model, data, steps = int(m.model_at), int(m.data_at), m.steps
     gust = a.gusts.rows[next_row(a.gusts) if m.gusty else 0]
-    begin_period(physics, arm_command, magnet, gust, m.tick)
-    affect(a.effects, physics.rotors.efficiency)
+    begin_period(body, arm_command, magnet, gust, m.tick)
+    affect(a.effects, body.rotors.efficiency)
     for _ in range(steps):
-        actuate(physics, motors)
+        actuate(body, motors)
         call_all(a.effects.joints)
         error = mj_step(model, data)
         if error:
             return error
-        average(physics, 1.0 / steps)
+        average(body, 1.0 / steps)
     m.tick += 1
     return 0

@@ -1,4 +1,4 @@
-"""The physics of one control period: rotors, servos, drag and magnet around MuJoCo's steps."""
+"""The vehicle's arrays, and the physics of one control period around MuJoCo's steps."""
 
 from __future__ import annotations
 
@@ -18,43 +18,57 @@ from uam_sim_bridge.plant.gripper import move_fingers
 from uam_sim_bridge.plant.magnet import pull_fraction
 
 
-class PhysicsArrays(NamedTuple):
-    """What the physics reads and writes, as arrays that never move; most are MuJoCo's.
+class Body(NamedTuple):
+    """The vehicle and its surroundings, as arrays that never move; most are views into MuJoCo's.
 
-    thrust_control: see `rotor_step`; angles to torque_control: see `joint_step`. drag (3,)
-    [N s/m]; velocity (3,) [m/s], force (3,) [N] on the base, ENU; wind, wind_mean (3,) [m/s],
-    gust_keep (1,): see `blow`.
-    face, payload, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1.
-    finger_ends, finger_goal: see `move_fingers`.
-    sensed_force (3,) [m/s^2, FLU]: specific force of a physics step, specific_force: the mean.
+    position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
+    FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
+    [m/s^2, ENU] and angular [rad/s^2, FLU]. sensed_force (3,) [m/s^2, FLU]: specific force of a
+    physics step, specific_force: the mean of a control period. thrust_control: see `rotor_step`;
+    torque_control: see `joint_step`. force (3,) [N, ENU]: on the base; drag (3,) [N s/m]; wind,
+    wind_mean (3,) [m/s], gust_keep (1,): see `blow`. payload (7,): position [m] and quaternion;
+    face, payload_centre, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,):
+    part of the holding force; swing (1,) [rad]: angle of the magnet's pivot. finger_ends to
+    grip_force: of `Fingers`. imu_bias (6,): [rad/s, m/s^2]; encoder_units (2,): see `quantised`.
     """
 
     rotors: RotorArrays
-    thrust_control: np.ndarray
     servos: ServoArrays
-    angles: np.ndarray
-    joint_rates: np.ndarray
-    torque_control: np.ndarray
-    drag: np.ndarray
+    position: np.ndarray
+    quaternion: np.ndarray
     velocity: np.ndarray
+    rates: np.ndarray
+    alpha: np.ndarray
+    alpha_dot: np.ndarray
+    base_acceleration: np.ndarray
+    alpha_ddot: np.ndarray
+    sensed_force: np.ndarray
+    specific_force: np.ndarray
+    thrust_control: np.ndarray
+    torque_control: np.ndarray
+    force: np.ndarray
+    drag: np.ndarray
     wind: np.ndarray
     wind_mean: np.ndarray
     gust_keep: np.ndarray
-    force: np.ndarray
-    face: np.ndarray
     payload: np.ndarray
+    face: np.ndarray
+    payload_centre: np.ndarray
     payload_axes: np.ndarray
     gap_constants: np.ndarray
     magnet_control: np.ndarray
+    swing: np.ndarray
     finger_ends: np.ndarray
     finger_goal: np.ndarray
-    sensed_force: np.ndarray
-    specific_force: np.ndarray
+    opening: np.ndarray
+    grip_force: np.ndarray
+    imu_bias: np.ndarray
+    encoder_units: np.ndarray
 
 
 @borrowing
 def begin_period(
-    a: PhysicsArrays, arm_command: np.ndarray, magnet: bool, gust: np.ndarray, tick: int
+    a: Body, arm_command: np.ndarray, magnet: bool, gust: np.ndarray, tick: int
 ) -> None:
     """Write the loads of control period `tick`: drag -c (v - wind), pull of the magnet, fingers.
 
@@ -66,20 +80,22 @@ def begin_period(
     for i in range(3):
         a.force[i] = a.drag[i] * (a.wind[i] - a.velocity[i])
         a.specific_force[i] = 0.0
-    pull = pull_fraction(a.face, a.payload, a.payload_axes, a.gap_constants) if magnet else 0.0
+    pull = (
+        pull_fraction(a.face, a.payload_centre, a.payload_axes, a.gap_constants) if magnet else 0.0
+    )
     a.magnet_control[0] = pull
     move_fingers(a.finger_ends, a.finger_goal, magnet)
 
 
 @borrowing
-def actuate(a: PhysicsArrays, commands: np.ndarray) -> None:
+def actuate(a: Body, commands: np.ndarray) -> None:
     """Write thrusts and joint torques of the next physics step; commands (rotors,): 0..1."""
     rotor_step(commands, a.rotors, a.thrust_control)
-    joint_step(a.servos, a.angles, a.joint_rates, a.torque_control)
+    joint_step(a.servos, a.alpha, a.alpha_dot, a.torque_control)
 
 
 @borrowing
-def average(a: PhysicsArrays, weight: float) -> None:
+def average(a: Body, weight: float) -> None:
     """Add `weight` times the specific force of a physics step to its mean."""
     for i in range(3):
         a.specific_force[i] += weight * a.sensed_force[i]

@@ -297,7 +297,7 @@ def sense_step(arrays: tuple) -> int:
     for i in range(3):
         put(plant.samples[taken % len(plant.samples)][6 + i * n :], s.joints[i])
     s.stamps[GRIP] = NOTHING
-    if len(plant.observed.opening):
+    if len(plant.body.opening):
         s.stamps[GRIP] = s.stamps[JOINTS]
         put(plant.samples[taken % len(plant.samples)][6 + 3 * n :], s.grip)
     taken = m.tick - m.imu_late

@@ -48,7 +48,7 @@ class ArmOcclusion(Effect):
         markers = np.vstack([bench.positions, DECK])
         errors = self.marker_error * noise.standard_normal(markers.shape)
         model, data = bench.model, bench.data
-        chain = model.jnt_bodyid[model.dof_jntid[bench.arm_dofs]].astype(np.int64)
+        chain = model.jnt_bodyid[model.dof_jntid[bench.arm]].astype(np.int64)
         payload = data.xpos[model.body(PAYLOAD).id]
         arrays = OcclusionArrays(
             *(bench.pose, bench.memory, bench.base_position, bench.base_axes),

@@ -17,7 +17,8 @@ from uam_control.maths.memory import Number, record
 from uam_control.settings.parameter_set import ANY_LENGTH, Bound, NamedSet, number, vector
 from uam_sim_bridge.plant.actuators import Rotors
 from uam_sim_bridge.plant.engines import PlantError
-from uam_sim_bridge.plant.sensors import Mocap, Noise
+from uam_sim_bridge.plant.physics import Body
+from uam_sim_bridge.plant.sensors import VEHICLE_POSE, Mocap, Noise
 from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
 Pose = tuple[float, np.ndarray, np.ndarray]  # stamp [s], position [m, ENU], quaternion [w x y z]
@@ -47,12 +48,12 @@ def several(description: str, unit: str, low: float, high: float, length: int = 
 class Bench:
     """The parts of a plant on which effects act. Its arrays never move.
 
-    rotors: their efficiency and constants may change; mocap; arm: first degree of freedom and
-    number of joints; torque_control (n,) [N m]: on the joints; encoder_units (2,): see `quantised`;
-    sample (6 + 3 n,): newest of IMU and joints, see `PlantArrays`; pose (POSE,): newest of the
-    motion capture; lift (rotors,): factors on the thrust of the next tick, set to 1 before each
-    tick; positions (rotors, 3) [m, FLU] and directions (rotors,), 1 for counter-clockwise.
-    `lost`: whether the newest pose is; `late` [s]: its added delay.
+    rotors: their efficiency and constants may change; mocap; body: the vehicle's arrays. `period`
+    [s]: of control; `joints`: number n; `arm`: their degrees of freedom; `sample` (8 + 3 n,):
+    newest of IMU and joints, see `PlantArrays`; `pose` (POSE,): newest of the motion capture;
+    `lift` (rotors,): factors on the thrust of the next tick, set to 1 before each tick; `positions`
+    (rotors, 3) [m, FLU] and `directions` (rotors,), 1 for counter-clockwise; `base_position` (3,),
+    `base_axes` (9,): of MuJoCo. `lost`: whether the newest pose is; `late` [s]: its added delay.
     """
 
     vehicle: Vehicle
@@ -60,35 +61,24 @@ class Bench:
     data: mujoco.MjData
     rotors: Rotors
     mocap: Mocap
-    period: float
-    arm: tuple[int, int]
-    torque_control: np.ndarray
-    encoder_units: np.ndarray
-    sample: np.ndarray
-    pose: np.ndarray
+    body: Body
 
     lost, late = Number(), Number()
 
     def __post_init__(self) -> None:
         self.memory = record("lost", "late")
-        rotors = self.vehicle.description.rotors
-        self.lift = np.ones(len(rotors))
-        self.positions = np.array([rotor.position for rotor in rotors])
-        self.directions = np.array([1.0 if r.counter_clockwise else -1.0 for r in rotors])
-        base = self.model.body(BASE).id
-        self.base_position = self.data.xpos[base]
-        self.base_axes = self.data.xmat[base]  # row by row, body → world
-
-    @property
-    def arm_dofs(self) -> slice:
-        """Degrees of freedom of the joints."""
-        return slice(self.arm[0], self.arm[0] + self.arm[1])
-
-    @property
-    def angles(self) -> np.ndarray:
-        """Angles of the joints (n,) [rad], a view."""
-        start = self.model.jnt_qposadr[self.model.dof_jntid[self.arm[0]]]
-        return self.data.qpos[start : start + self.arm[1]]
+        described, model = self.vehicle.description, self.model
+        self.period, self.joints = described.control_period, len(described.joints)
+        first = model.joint(described.joint_names[0]).dofadr[0]
+        self.arm = slice(first, first + self.joints)
+        self.sample = np.empty(8 + 3 * self.joints)
+        self.pose = self.mocap.arrays.taken[VEHICLE_POSE]
+        self.lift = np.ones(len(described.rotors))
+        self.positions = np.array([rotor.position for rotor in described.rotors])
+        turns = [1.0 if r.counter_clockwise else -1.0 for r in described.rotors]
+        self.directions = np.array(turns)
+        base = model.body(BASE).id
+        self.base_position, self.base_axes = self.data.xpos[base], self.data.xmat[base]
 
     def for_each(self, name: str, values: Sequence[float], count: int, of: str) -> np.ndarray:
         """Return values (count,) of a parameter declared by `each`; raise PlantError."""

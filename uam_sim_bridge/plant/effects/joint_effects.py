@@ -52,10 +52,10 @@ class ServoNoise(Effect):
     bandwidth: float = size("of the noise", "Hz", 0.1, 100.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        count, keep = bench.arm[1], math.exp(-2.0 * math.pi * self.bandwidth * bench.period)
+        count, keep = bench.joints, math.exp(-2.0 * math.pi * self.bandwidth * bench.period)
         sizes = bench.for_each("servo_noise: torque", self.torque, count, "joints")
         white = Noise(noise, math.sqrt(1.0 - keep * keep) * sizes)
-        arrays = bench.torque_control, white.arrays, np.zeros(count), keep
+        arrays = bench.body.torque_control, white.arrays, np.zeros(count), keep
         return Compiled(arrays, [white], tick=renew, joints=add)
 
 
@@ -106,7 +106,7 @@ class JointGear(Effect):
     width: float = size("w, speed of smooth friction, 0: dry; a rigid gear has one", "rad/s", 0, 1)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        model, dofs, count = bench.model, bench.arm_dofs, bench.arm[1]
+        model, dofs, count = bench.model, bench.arm, bench.joints
         coulomb = model.dof_frictionloss[dofs].copy()
         if self.coulomb:
             coulomb = bench.for_each("joint_gear: coulomb", self.coulomb, count, "joints")
@@ -124,10 +124,10 @@ class JointGear(Effect):
             bench.for_each("joint_gear: load", self.load, count, "joints"),
             np.array(constants),
             followed(bench, inertia, self.stiffness, self.damping),
-            bench.angles.copy(),
+            bench.body.alpha.copy(),
             np.zeros(count),
         )
-        arrays = motors, bench.angles, bench.data.qvel[dofs], bench.torque_control
+        arrays = motors, bench.body.alpha, bench.data.qvel[dofs], bench.body.torque_control
         return Compiled(arrays, joints=act)
 
     def check_together(self) -> None:
@@ -146,7 +146,7 @@ def followed(bench: Bench, motor: np.ndarray, stiffness: float, damping: float) 
     mujoco.mj_forward(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    link = np.diag(np.linalg.inv(mass))[bench.arm_dofs]  # 1 / J of each, the others free
+    link = np.diag(np.linalg.inv(mass))[bench.arm]  # 1 / J of each, the others free
     step = model.opt.timestep
     needed = (stiffness * step**2 + 2.0 * damping * step) * (1.0 / motor + link)
     return np.minimum(1.0, STABLE / np.maximum(needed, 1e-9))
@@ -242,8 +242,8 @@ class JointReadings(Effect):
     counts: float = size("counts of the encoder per turn", "1", 64.0, 1048576.0)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        n, ticks = bench.arm[1], round(self.delay / bench.period)
-        bench.encoder_units[:] = 2.0 * np.pi / self.counts, self.speed_unit
+        n, ticks = bench.joints, round(self.delay / bench.period)
+        bench.body.encoder_units[:] = 2.0 * np.pi / self.counts, self.speed_unit
         speeds = bench.sample[6 + n : 6 + 2 * n]
         arrays = speeds, np.zeros((ticks + 1, n)), np.zeros(1, dtype=np.int64)
         return Compiled(arrays, sample=hold_back)
@@ -278,12 +278,12 @@ class CableTorque(Effect):
     rest_spread_deg: float = size("standard deviation of the rest angle, per flight", "deg", 0, 45)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
-        joints = bench.arm[1]
+        joints = bench.joints
         drawn = noise.standard_normal((2, joints))
         stiffness = self.stiffness * np.abs(1.0 + self.stiffness_spread * drawn[0])
         rest = bench.vehicle.description.stowed + np.radians(self.rest_spread_deg) * drawn[1]
-        torque = bench.data.qfrc_applied[bench.arm_dofs]
-        return Compiled((torque, bench.angles, stiffness, rest), tick=pull)
+        torque = bench.data.qfrc_applied[bench.arm]
+        return Compiled((torque, bench.body.alpha, stiffness, rest), tick=pull)
 
 
 @borrowing
