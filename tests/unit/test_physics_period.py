@@ -18,7 +18,6 @@ from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.physics import actuate, average, begin_period
 from uam_sim_bridge.plant.plant import check_arrays
-from uam_sim_bridge.plant.sensors import Delay
 
 VEHICLES = {name: Vehicle.of(load_description(name)) for name in ("s500_arm3", "hexa_arm")}
 
@@ -65,14 +64,15 @@ def test_a_sample_that_compiled_code_would_misread_is_refused(bad):
 @pytest.mark.parametrize("latency", [0, 1, 3])
 def test_an_arm_command_arrives_after_the_latency_of_the_bus(latency):
     vehicle = VEHICLES["s500_arm3"].changed({"servos.command_latency_ticks": latency})
-    plant, line = MujocoPlant(vehicle, 0.0, seed=1), Delay(latency)
+    plant, commands = MujocoPlant(vehicle, 0.0, seed=1), []
     plant.count_from(5)  # of an earlier simulation
     held = np.zeros(3)
     for k in range(12):
         sent = np.array([0.1 * k, np.nan if k % 3 else -0.2 * k, 0.5])
         plant.step(np.zeros(4), sent, False)
-        due = line(k, sent)
-        if due is not None:
+        commands.append(sent)
+        if k >= latency:
+            due = commands[k - latency]
             held = np.where(np.isnan(due), held, due)
         np.testing.assert_array_equal(plant.servos.command, held)
 

@@ -13,7 +13,6 @@ from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.sensors import (
-    Delay,
     Mocap,
     encoder_units,
     generators,
@@ -84,12 +83,6 @@ def test_mocap_keeps_its_rate_on_average():
         still = np.zeros(3), np.zeros(3)
         exposures += take_pose(mocap.arrays, k * 0.004, 0.004, pose[:3], pose[3:], *still, pose)
     assert exposures == pytest.approx(1200, abs=1)
-
-
-def test_delay_hands_out_what_went_in_some_ticks_ago():
-    line = Delay(3)
-    got = [line(tick, (tick,) if tick != 1 else None) for tick in range(6)]
-    assert got == [None, None, None, (0,), None, (2,)]
 
 
 def test_sensors_arrive_late_with_the_stamp_of_their_exposure():

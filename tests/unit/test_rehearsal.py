@@ -21,12 +21,11 @@ from uam_sim_bridge.devices.mocap.calibration import Calibration
 from uam_sim_bridge.devices.mocap.frame import BodyPose
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
-from uam_sim_bridge.laboratory.cables import Cables
+from uam_sim_bridge.faults.timeline import Timeline
 from uam_sim_bridge.laboratory.laboratory import Laboratory
 from uam_sim_bridge.laboratory.laboratory_parameters import LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
-from uam_sim_bridge.laboratory.tracked_room import RoomBody
-from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain
+from uam_sim_bridge.laboratory.set_up import RoomBody, mistaken_chain
 from uam_sim_bridge.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.plant import Vehicle
 
@@ -251,9 +250,9 @@ CABLES = [name for name, kind in FAULTS.items() if kind.PLACE == CABLE and "pull
 def test_each_cable_is_pulled_and_plugged_in_again(laboratory, name):
     lab = laboratory()
     at = {"fault": name, "at": 1.0, "duration": 2.0}
-    cables = Cables(lab, Schedule((timed(at, {}, "test"),)))
-    cables.timeline.mission_at(0.0, 0.0, "take-off")
-    assert cables.update(0.5) == []
+    lab.timeline = Timeline(Schedule((timed(at, {}, "test"),)))
+    lab.timeline.mission_at(0.0, 0.0, "take-off")
+    assert lab.pull_cables(0.5) == []
     lab.mocap.expose(NOW, {"uam": (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))})
 
     def seen():
@@ -267,9 +266,9 @@ def test_each_cable_is_pulled_and_plugged_in_again(laboratory, name):
         )
 
     whole = seen()
-    assert [one.fault.NAME for one in cables.update(1.5)] == [name]
+    assert [one.fault.NAME for one in lab.pull_cables(1.5)] == [name]
     assert seen() != whole
-    cables.update(4.0)
+    lab.pull_cables(4.0)
     if name == "servo_overload":  # only a reboot clears it
         lab.servos[0].restart()
     assert seen() == whole
@@ -281,12 +280,12 @@ PTYS = ("ttyARM", "ttyTELEM2", "ttyAUTOPILOT")
 def test_a_hot_servo_stops_at_its_limit(laboratory):
     lab = laboratory()
     fault = {"fault": "servo_overheating", "at": 0.0, "rate": 1000.0}
-    cables = Cables(lab, Schedule((timed(fault, {}, "test"),)))
-    cables.timeline.mission_at(0.0, 0.0, "take-off")
+    lab.timeline = Timeline(Schedule((timed(fault, {}, "test"),)))
+    lab.timeline.mission_at(0.0, 0.0, "take-off")
     servo = lab.servos[0]
     servo.set("Torque Enable", 1)
     for tick in range(100):
-        cables.update(tick * PERIOD)
+        lab.pull_cables(tick * PERIOD)
     assert servo.temperature == 95.0
     servo.read(0, 1)  # the sensor is read: hotter than 80 degrees is an error
     assert servo.alert and servo.get("Torque Enable") == 0

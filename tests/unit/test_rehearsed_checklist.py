@@ -24,8 +24,7 @@ from uam_sim_bridge.faults.schedule import timed
 from uam_sim_bridge.laboratory.laboratory import Laboratory
 from uam_sim_bridge.laboratory.laboratory_parameters import LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
-from uam_sim_bridge.laboratory.tracked_room import RoomBody
-from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_room
+from uam_sim_bridge.laboratory.set_up import RoomBody, mistaken_room
 from uam_sim_bridge.plant import Vehicle
 
 VEHICLE = load_description()

@@ -10,7 +10,6 @@ import pytest
 from uam_sim_bridge.plant.sensors import (
     PAYLOAD_POSE,
     VEHICLE_POSE,
-    Delay,
     Imu,
     Mocap,
     Noise,
@@ -119,20 +118,6 @@ def test_mocap_exposes_at_its_rate_and_not_late_by_rounding():
     times = [0.0, 0.0, 0.2, 0.25 - 1e-9, 0.3, 0.5 - 1e-8, 0.5 - 5e-10, 0.6, 0.75, 1.0]
     expected = [True, False, False, True, False, False, True, False, True, True]
     assert [due(mocap, time) for time in times] == expected
-
-
-def test_a_delay_hands_out_one_sample_when_it_is_due():
-    line = Delay(2)
-    given = [(0, ("a",)), (1, ("b",)), (2, None), (2, None), (5, None), (5, None)]
-    assert [line(tick, sample) for tick, sample in given] == [
-        None,
-        None,
-        ("a",),  # due at 2
-        None,
-        ("b",),  # due at 3
-        None,
-    ]
-    assert Delay(0)(3, ("c",)) == ("c",)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -29,7 +29,7 @@ class CableFault(Fault):
         """Make the mistake in the servos (`chain.ServoDescription`), joints base to tip."""
 
     def set_up(self, bodies: list[Any]) -> None:
-        """Make the mistake in the tracked bodies (`tracked_room.RoomBody`), the vehicle's first."""
+        """Make the mistake in the tracked bodies (`set_up.RoomBody`), the vehicle's first."""
 
 
 class JointFault(CableFault):

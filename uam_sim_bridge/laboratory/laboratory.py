@@ -29,18 +29,17 @@ from uam_sim_bridge.devices.mocap.calibration import Calibration
 from uam_sim_bridge.devices.mocap.emulated.mocap_server import MocapServer, Streaming
 from uam_sim_bridge.devices.serial.serial_cable import SerialCable
 from uam_sim_bridge.faults.schedule import Schedule
+from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.laboratory.hil_line import HilLine
-from uam_sim_bridge.laboratory.laboratory_parameters import LINE, LaboratoryParameters
+from uam_sim_bridge.laboratory.laboratory_parameters import LINE, TOPIC, LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Grip, joint_torque, wrench
-from uam_sim_bridge.laboratory.tracked_room import RoomBody
-from uam_sim_bridge.laboratory.wiring_mistakes import mistaken_chain, mistaken_room
+from uam_sim_bridge.laboratory.set_up import RoomBody, mistaken_chain, mistaken_room
 from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.plant import Samples, Truth, Vehicle, warm_up
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, plant_class
 
 ADAPTER_LATENCY = 0.001  # [s] latency timer of the servo bus's adapter
 OWN_DELAYS = {  # those that the emulated devices have
-    "sensors.mocap.latency_ticks": 0,
     "sensors.joints.latency_ticks": 0,
     "servos.command_latency_ticks": 0,
 }
@@ -54,8 +53,9 @@ class Laboratory:
 
     `bus`, `cable`, `mocap`, `hil`: the devices; `grip`: the person's hands; `folded` (n,): the
     arm at the start [rad], as which hands hold it until the servos are first driven.
-    Cables are pulled by `cables.Cables`. `imu_plugged`: whether the companion's own IMU is there;
-    `poses_come`: whether another's driver of the motion capture has poses.
+    `timeline`: of the faults after the start, see `pull_cables`. `imu_plugged`: whether the
+    companion's own IMU is there; `poses_come`: whether another's driver of the motion capture has
+    poses.
     """
 
     def __init__(
@@ -66,12 +66,14 @@ class Laboratory:
         calibration: Calibration,
         wiring: Schedule | None = None,
     ) -> None:
-        """chain: servos as described; calibration: of the cameras; wiring: mistakes of the set-up.
+        """chain: servos as described; calibration: of the cameras; wiring: faults of cables, and
+        mistakes of the set-up.
 
         Raises OSError (port in use), FaultError.
         """
         latency = vehicle.numbers["sensors"]["mocap"]["latency_ticks"]
-        vehicle = vehicle.changed(OWN_DELAYS)
+        own = {} if parameters.poses == TOPIC else {"sensors.mocap.latency_ticks": 0}
+        vehicle = vehicle.changed(OWN_DELAYS | own)
         self.description: VehicleDescription = vehicle.description
         p, self.chain, self.calibration = parameters, chain, calibration
         start = tuple(p.arm_start)
@@ -80,6 +82,7 @@ class Laboratory:
         warm_up(plant())
         self.parameters = p
         self.wiring = wiring or Schedule()
+        self.timeline = Timeline(self.wiring)
         self.grip = Grip()
         self.folded = np.array(start or vehicle.description.stowed, dtype=float)
         self._driven = False  # whether the servos have had a command
@@ -126,6 +129,18 @@ class Laboratory:
         if p.payload:
             found.append(RoomBody(p.payload, calibration.without_body()))
         return found
+
+    def pull_cables(self, stamp: float) -> list[FaultState]:
+        """Pull the cables that are due at `stamp` [s], the plant's time, and plug them in again.
+
+        Returns the faults that began or ended.
+        """
+        changed = self.timeline.update(stamp)
+        for one in changed:
+            one.fault.pull(self, one.active)
+        for fault in self.timeline.active:
+            fault.last(self)
+        return changed
 
     def sense(self, host: float) -> tuple[Samples, Truth]:
         """Sample the sensors of this tick; expose the cameras at `host` [s], system's time."""

@@ -37,7 +37,6 @@ from uam_sim_bridge import hardware_priority
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.devices.mocap.calibration import load
 from uam_sim_bridge.faults import CABLE, Schedule
-from uam_sim_bridge.laboratory.cables import Cables
 from uam_sim_bridge.laboratory.laboratory import Laboratory
 from uam_sim_bridge.laboratory.laboratory_parameters import TOPIC, LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
@@ -46,7 +45,6 @@ from uam_sim_bridge.nodes.plant_options import declare_laboratory
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.sensors import Delay
 
 IMU_DRIVER, POSE_DRIVER = "imu_driver", "pose_driver"
 NAME = "laboratory"
@@ -59,38 +57,22 @@ ASK_AGAIN = 2.0  # [s] between two confirmations of a step
 
 
 class DriverTopic:
-    """A node of its own that publishes one topic."""
+    """A node of its own that publishes one topic, as the driver of a sensor."""
 
-    def __init__(self, node: Node, name: str, topic: Topic, writer: Any, latency: int) -> None:
-        """node: in whose namespace; writer: fills the message; latency [ticks]."""
+    def __init__(self, node: Node, name: str, topic: Topic, writer: Any) -> None:
+        """node: in whose namespace; writer: fills the message."""
         self._own = Node(name, namespace=node.get_namespace())
-        self._publisher = topic.outlet(self._own)
-        self._writer, self._delay = writer, Delay(latency)
+        self._publisher, self._writer = topic.outlet(self._own), writer
 
-    def publish(self, tick: int, sample: tuple | None, shift: float, plugged: bool = True) -> None:
-        """Publish the sample that is due at `tick`; sample: a new one, time [s] of the plant first.
-
-        shift [s]: from the plant's time to the system's; plugged: whether the sensor is there.
-        """
-        due = self._delay(tick, sample)
-        if due is not None and plugged:
-            time, *values = due
+    def publish(self, sample: tuple | None, shift: float) -> None:
+        """Publish a sample, time [s] of the plant first; shift [s]: from it to the system's."""
+        if sample is not None:
+            time, *values = sample
             self._publisher.publish(self._writer.fill(round((time + shift) * SECOND), *values))
 
     def close(self) -> None:
         """Destroy the node."""
         self._own.destroy_node()
-
-
-def imu_driver(node: Node, latency: int) -> DriverTopic:
-    """Return the driver of the companion's IMU; latency [ticks]."""
-    writer = ImuWriter(frame(node, topics.BODY))
-    return DriverTopic(node, IMU_DRIVER, topics.IMU, writer, latency)
-
-
-def pose_driver(node: Node, latency: int) -> DriverTopic:
-    """Return another's driver of the motion capture; latency [ticks] from exposure."""
-    return DriverTopic(node, POSE_DRIVER, topics.MOCAP, PoseWriter(), latency)
 
 
 @dataclass
@@ -127,17 +109,16 @@ class Rehearsal:
         chain, cameras = load_chain(hardware_file(p.hardware), vehicle), load(p.calibration)
         self.lab = Laboratory(numbers, p, chain, cameras, faults)
         self.statistics = Statistics()
-        self._cables = Cables(self.lab, faults)
-        self._changed = self._cables.update(0.0)  # faults at the start; published later
+        self._changed = self.lab.pull_cables(0.0)  # faults at the start; published later
         self._fault_topic = FaultTopic(node) if faults else None
         self._truth = TruthTopics(node, vehicle)
-        sensors = numbers.numbers["sensors"]
         self._imu: DriverTopic | None = None
         if p.imu == TOPIC:
-            self._imu = imu_driver(node, sensors["imu"]["latency_ticks"])
+            writer = ImuWriter(frame(node, topics.BODY))
+            self._imu = DriverTopic(node, IMU_DRIVER, topics.IMU, writer)
         self._poses: DriverTopic | None = None
         if p.poses == TOPIC:
-            self._poses = pose_driver(node, sensors["mocap"]["latency_ticks"])
+            self._poses = DriverTopic(node, POSE_DRIVER, topics.MOCAP, PoseWriter())
         self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
         self._checklist = polling.listen(node, topics.CHECKLIST)
         self._confirm = node.create_client(Trigger, "checklist/confirm")
@@ -179,17 +160,17 @@ class Rehearsal:
     def _tick(self, host: float) -> None:
         """Sense, publish, wait for the end of the tick, and step; host: system's time [s]."""
         lab, stamp = self.lab, round(host * SECOND)
-        self._changed += self._cables.update(lab.plant.time)
+        self._changed += lab.pull_cables(lab.plant.time)
         if self._changed and self._fault_topic:
             self._fault_topic.publish(stamp, self._changed)
             self._changed = []
         samples, truth = lab.sense(host)
         lab.send_hil(samples, truth)
         tick, shift = lab.plant.tick, host - lab.plant.time
-        if self._imu is not None:
-            self._imu.publish(tick, samples.hil, shift, lab.imu_plugged)
-        if self._poses is not None:
-            self._poses.publish(tick, samples.mocap, shift, lab.poses_come)
+        if self._imu is not None and lab.imu_plugged:
+            self._imu.publish(samples.imu, shift)
+        if self._poses is not None and lab.poses_come:
+            self._poses.publish(samples.mocap, shift)
         if tick % LISTEN_TICKS:
             self._truth.publish_state(stamp, truth)
         else:
@@ -210,7 +191,7 @@ class Rehearsal:
         for stamp, mission in door.decoded(self._mission_topic, MissionStatus.from_message):
             self._mission = mission
             shift = self.clock.host(0)
-            self._cables.timeline.mission_at(
+            self.lab.timeline.mission_at(
                 stamp / SECOND - shift, self._mission.time, self._mission.phase
             )
         for _, state in door.decoded(self._checklist, ChecklistState.from_message):

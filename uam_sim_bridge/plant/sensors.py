@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -69,22 +68,6 @@ def next_row(noise: NoiseArrays) -> int:
     m = noise.numbers[0]
     m.used += 1
     return m.used - 1
-
-
-class Delay:
-    """Delay line of a number of ticks. No sample overtakes another."""
-
-    def __init__(self, ticks: int) -> None:
-        self.ticks = ticks
-        self.queue: deque[tuple[int, tuple]] = deque()  # tick at which it is due, sample
-
-    def __call__(self, tick: int, sample: tuple | None) -> tuple | None:
-        """Store the sample taken at `tick`, if any; return the sample due by then, or None."""
-        if sample is not None:
-            self.queue.append((tick + self.ticks, sample))
-        if self.queue and self.queue[0][0] <= tick:
-            return self.queue.popleft()[1]
-        return None
 
 
 def generators(seed: int, count: int) -> list[np.random.Generator]:

@@ -1,11 +1,14 @@
-"""What the cameras see of a body, for any calibration: the inverse of the driver's conversion.
+"""The set-up of servos and cameras, with its mistakes.
+
+What the cameras see of a body, for any calibration, is the inverse of the driver's conversion:
 
     R_tr = R_wtᵀ R_wb R_rbᵀ        p_t = R_wtᵀ (p_b + origin + R_wb pivot)
 
-w world, t tracker, b base_link, r rigid body; see `drivers.mocap.calibration`. A wrong set-up shows
+w world, t tracker, b base_link, r rigid body; see `devices.mocap.calibration`. A wrong set-up shows
 something else: another upward axis, or a rigid body made with another heading.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +18,10 @@ from uam_control.maths.rotations import (
     quaternion_from_euler,
     quaternion_multiply,
 )
+from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ServoDescription
 from uam_sim_bridge.devices.mocap.calibration import UPRIGHT, Calibration, conjugate
+from uam_sim_bridge.faults.fault import FaultError
+from uam_sim_bridge.faults.schedule import Schedule
 
 
 @dataclass
@@ -53,3 +59,22 @@ class RoomBody:
             at = matrix_from_quaternion(other) @ at
             turned = quaternion_multiply(other, quaternion_multiply(turned, conjugate(other)))
         return tuple(at.tolist()), (*turned[1:].tolist(), float(turned[0]))
+
+
+def mistaken_chain(chain: ArmChain, mistakes: Schedule) -> tuple[ServoDescription, ...]:
+    """Return the servos as mounted, in the order of the joints. Raises FaultError."""
+    servos = list(chain.servos)
+    for fault in (one.fault for one in mistakes.faults):
+        joint = max(fault.values.get(name, 0) for name in ("joint", "other"))
+        if joint > len(servos):
+            raise FaultError(f"{fault.NAME}: joint {joint:g}: the vehicle has {len(servos)}")
+        fault.mount(servos)
+    return tuple(servos)
+
+
+def mistaken_room(bodies: Sequence[RoomBody], mistakes: Schedule) -> list[RoomBody]:
+    """Return the bodies, the vehicle's first, as the cameras stream them."""
+    found = list(bodies)
+    for one in mistakes.faults:
+        one.fault.set_up(found)
+    return found
