@@ -7,7 +7,7 @@ import pytest
 
 from uam_control.setpoints.loop_delay import DELAYS, LoopDelay, follow, pause
 from uam_control.supervision import SupervisionParameters
-from uam_control.supervision.setpoint_delay import by_link, by_loop, larger, margin_left
+from uam_control.supervision.checks import by_link, by_loop, larger, margin_left
 
 PERIOD, LAG = 0.004, 0.017
 

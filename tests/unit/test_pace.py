@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.ages import STALE
-from uam_control.supervision.pace import WINDOW, Pace, Waited
+from uam_control.supervision.inputs import WINDOW, Pace, Waited
 
 
 def run(pace, factor, seconds, stamp=0.0, wall=100.0):

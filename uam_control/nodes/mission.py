@@ -38,8 +38,8 @@ from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, State
+from uam_control.supervision.checks import margin_left
 from uam_control.supervision.inputs import SUBSYSTEMS
-from uam_control.supervision.setpoint_delay import margin_left
 from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import preflight_message

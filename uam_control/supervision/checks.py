@@ -1,6 +1,13 @@
 """Checks of all monitored quantities against their limits.
 
 The monitors run only if a value is near or beyond a limit, or was so recently.
+
+How much later than in the profile's model the setpoints act follows from two measurements, checked
+apart. Before take-off `delay_share_of_round_trip` of the round trip counts, as all of it may be on
+the way to the autopilot, in flight half of it. In flight the measured loop delay beyond
+`delay_nominal` counts, too. The round trip is a clock's difference, the loop delay a fit, for which
+it needs `delay_after` of evidence. That is unknown while the vehicle hardly moves, and while
+something else moves it. A loop that begins to oscillate moves.
 """
 
 import math
@@ -17,8 +24,7 @@ from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import NUMBERS, Observation, ReadingArrays, Readings
-from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
-from uam_control.supervision.supervision_parameters import SupervisionParameters
+from uam_control.supervision.supervision_parameters import SupervisionLimits, SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop delay"
@@ -27,6 +33,7 @@ DELAYS = (SETPOINT_DELAY, REFERENCE_DELAY)  # of the link, known before the take
 POSES_OFF = "motion capture"
 CONTRADICTION = "motion capture and IMU"
 STUCK = "angle of a joint"
+SYMMETRIC = 0.5  # share of the round trip that is on the way to the autopilot, if both are alike
 
 
 class Check(NamedTuple):
@@ -376,3 +383,29 @@ def _below(values: np.ndarray, limits: np.ndarray) -> bool:
         if not values[i] < limits[i]:
             return False
     return True
+
+
+@borrowing
+def by_link(round_trip: float, share: float, in_flight: bool) -> float:
+    """Return the delay [s] that the round trip [s] shows, NaN if unknown; share: on the ground."""
+    return (SYMMETRIC if in_flight else share) * round_trip
+
+
+@borrowing
+def by_loop(loop_delay: float, nominal: float, in_flight: bool) -> float:
+    """Return the delay [s] that the loop delay [s] shows, NaN if unknown; it counts in flight."""
+    if not in_flight:
+        return math.nan
+    late = loop_delay - nominal
+    return 0.0 if late < 0.0 else late
+
+
+@borrowing
+def larger(link: float, loop: float) -> float:
+    """Return the larger of two delays [s]; NaN only if both are unknown."""
+    return loop if math.isnan(link) or loop > link else link
+
+
+def margin_left(delay: float, limits: SupervisionLimits) -> float:
+    """Return the share of the margin that is left, below 0 beyond it; NaN for an unknown delay."""
+    return 1.0 - delay / limits.delay_margin

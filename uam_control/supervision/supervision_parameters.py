@@ -68,7 +68,7 @@ class SupervisionLimits(ParameterSet):
     autopilot_age_land: float = _land(
         ages.LAND, "time without a message of autopilot or bridge", "s", 0.3, 60.0
     )
-    # delay of the setpoints against the margin of the profile, see setpoint_delay.py
+    # delay of the setpoints against the margin of the profile, see checks.py
     delay_margin: float = number(
         0.05, "delay of the setpoints at which the loops oscillate: uam margins", "s", 0.001, 10.0
     )
@@ -85,7 +85,7 @@ class SupervisionLimits(ParameterSet):
     missed_ticks_failsafe: float = _failsafe(
         250.0, "control ticks missed within a second", "1", 1.0, 1e4
     )
-    # an autopilot with its own clock, see pace.py
+    # an autopilot with its own clock, see `Pace`
     slower_hold: float = _hold(
         0.1, "share by which a simulation runs slower than the wall clock", "1", 0.0, 1.0
     )

@@ -35,7 +35,7 @@ from uam_control.stages.flight_measurements import FlightMeasurements, Sent
 from uam_control.stages.vision_pacing import VisionParameters
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
-from uam_control.supervision.pace import Waited
+from uam_control.supervision.inputs import Waited
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_position_command, read_state, read_torque
