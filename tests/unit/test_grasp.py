@@ -10,10 +10,15 @@ import pytest
 
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
-from uam_control.grasp.evidence import Load, by_mass, by_pose, by_travel, identified_mass
-from uam_control.grasp.kinematics import PlaceHistory, hand_and_levers
-from uam_control.grasp.sight import RunningMean
-from uam_control.grasp.thrust_reserve import expected_throttle
+from uam_control.grasp.evidence import (
+    Load,
+    by_mass,
+    by_pose,
+    by_travel,
+    expected_throttle,
+    identified_mass,
+)
+from uam_control.grasp.sight import PlaceHistory, RunningMean, hand_and_levers
 from uam_control.mission import load_scenario
 from uam_control.vehicle import chain_of, load_description
 

@@ -18,8 +18,7 @@ from uam_control.arm.placing import Room, placed, turning
 from uam_control.coordinates import ARM, CHI, CHI_DOT, YAW
 from uam_control.mission.hand_goals import HandPoints, HandPose, HandTwist, base_room, joint_room
 from uam_control.mission.motion.flatness import Flyer, flattened
-from uam_control.mission.plan_limits import check
-from uam_control.mission.plans import GoalPose, PlanRefused
+from uam_control.mission.plans import GoalPose, PlanRefused, check
 from uam_control.profiles.profile import default_profile
 from uam_control.supervision import Event, OperatorCommand, State
 from uam_control.vehicle import load_description

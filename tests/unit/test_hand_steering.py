@@ -7,7 +7,7 @@ import pytest
 
 from uam_control.arm.hand import hands
 from uam_control.control.hand_steering import HandParameters, hardest, squared
-from uam_control.stages.hand_stage import HandStage
+from uam_control.stages.law_stages import HandStage
 from uam_control.vehicle import chain_of, load_description
 
 VEHICLE = load_description()

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.coordinates import ARM, CHI, YAW
-from uam_control.mission.plan_limits import check
-from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points
+from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check
 from uam_control.supervision import Event, OperatorCommand, State
 
 COORDINATE = st.floats(-1.0, 1.0)

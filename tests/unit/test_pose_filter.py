@@ -16,9 +16,9 @@ from uam_control.estimation.pose_filter import (
     predict,
     predict_next,
     shift,
+    value_at,
     wait,
 )
-from uam_control.estimation.waiting import value_at
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HALF = math.sqrt(0.5)

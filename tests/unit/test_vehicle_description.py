@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.grasp.kinematics import hand_and_levers
+from uam_control.grasp.sight import hand_and_levers
 from uam_control.mission import load_scenario
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.profiles.profile import default_profile

@@ -10,7 +10,7 @@ import pytest
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.configuration import ConfigurationError, path
 from uam_control.vehicle import VehicleError, load_description
-from uam_control.vehicle.plant_numbers import NOT_OF_THE_PLANT
+from uam_control.vehicle.loading import NOT_OF_THE_PLANT
 from uam_lab.flights.flight_settings import settings
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant

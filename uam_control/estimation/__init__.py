@@ -1,4 +1,3 @@
 """Estimation of chi, chi_dot, chi_ddot from motion capture, IMU and joint encoders."""
 
-from uam_control.estimation.estimator import StateEstimator
-from uam_control.estimation.estimator_parameters import EstimatorParameters
+from uam_control.estimation.estimator import EstimatorParameters, StateEstimator

@@ -6,35 +6,90 @@ low-pass filtered; the corner frequencies are parameters.
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.ages import AHEAD
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.estimation.base import Estimator
-from uam_control.estimation.estimator_parameters import OBSERVER, EstimatorParameters
+from uam_control.estimation.base import BaseParameters, Estimator
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step, observer_step
 from uam_control.estimation.pose_clock import settled, suspend
 from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     FilterArrays,
+    allowed_bandwidth,
     begin_anew,
     correct_waiting,
     filter_arrays,
+    insert,
     parts_of,
     predict_next,
     wait,
 )
-from uam_control.estimation.waiting import insert
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import record
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion, rotate_back
+from uam_control.settings.parameter_set import choice, number
 
+REPORTED, OBSERVER = "reported", "observer"  # where the velocity of a joint comes from
 # rad/s; the noise of the estimated bias grows with the cube of the bandwidth
 QUIET_BANDWIDTH = 24.0
 LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
 READINGS = 16  # of the joints, that wait for the end of their tick at most
+
+
+@dataclass(frozen=True)
+class EstimatorParameters(BaseParameters):
+    """Bandwidths and corner frequencies of the estimator's filters, and gravity."""
+
+    estimator: str = choice(
+        "complementary", "the estimator that flies, fixed", ("complementary",), fixed=True
+    )
+    position_bandwidth: float = number(
+        12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
+    )
+    attitude_bandwidth: float = number(
+        8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
+    )
+    pose_gate: float = number(
+        0.15, "jump of the motion capture from which its poses are rejected", "m", 0.05, 1000.0
+    )
+    joint_bandwidth: float = number(
+        60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0
+    )
+    joint_velocity_weight: float = number(
+        80.0, "correction of joint state by the encoder velocity", "1/s", 0.0, 200.0
+    )
+    joint_velocity: str = choice(
+        REPORTED,
+        "velocity of a joint: the servo's corrects it, or an observer of its angle makes it",
+        (REPORTED, OBSERVER),
+    )
+    joint_observer_bandwidth: float = number(
+        20.0, "of the observer; its velocity is 0.23 / bandwidth late", "Hz", 1.0, 60.0
+    )
+    acceleration_cutoff: float = number(
+        5.0, "low-pass on the acceleration of the vehicle", "Hz", 0.1, 100.0
+    )
+    angular_acceleration_cutoff: float = number(
+        10.0, "low-pass on the derivative of the body rates", "Hz", 0.1, 100.0
+    )
+    joint_acceleration_cutoff: float = number(
+        5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
+    )
+
+    def capped(self, interval: float) -> list[str]:
+        """Return a line per bandwidth that is too large for a pose every `interval` [s]."""
+        allowed = allowed_bandwidth(interval)
+        given = ("position_bandwidth", "attitude_bandwidth")
+        why = f"{allowed:.3g}: a pose comes every {1e3 * interval:.3g} ms"
+        return [
+            f"{name} {value:g} rad/s acts as {why}"
+            for name in given
+            if (value := getattr(self, name)) > allowed
+        ]
 
 
 class EstimatorArrays(NamedTuple):

@@ -8,6 +8,7 @@ gravity and do not jump.
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,9 @@ from uam_control.maths.rotations import (
     quaternion_from_rotation_vector,
     quaternion_multiply,
 )
+from uam_control.settings.parameter_set import ParameterSet, choice
 
+MOCAP, ODOMETRY = "mocap", "odometry"  # where the poses come from
 RETURN, TURN_BACK = 0.1, 0.1  # m/s, rad/s
 # m, rad: a pose that is farther than this, and what an acceleration (m/s^2, rad/s^2) makes in the
 # time since the last one, from where those lead has jumped. A smaller jump is left to the estimate
@@ -30,6 +33,17 @@ AGILE, SPIN = 5.0, 10.0
 SMOOTH = 0.05  # s, time constant of the velocity at which the poses go on
 YAW, PLACE = 3, 4  # a place: x, y, z [m], yaw [rad]
 POSE = 7  # position and quaternion
+
+
+@dataclass(frozen=True)
+class PoseSourceParameters(ParameterSet):
+    """Source of the poses, of all nodes that read them; fixed once the node runs."""
+
+    pose_source: str = choice(
+        MOCAP,
+        "poses of a motion capture, or of an odometry (odometry/in), whose jumps are taken out",
+        (MOCAP, ODOMETRY),
+    )
 
 
 class AnchorArrays(NamedTuple):

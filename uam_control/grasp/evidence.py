@@ -3,7 +3,8 @@
 The motion capture of the payload decides where it is available: it measures the fact itself, for
 any mass. Without it the mass decides, identified twice: from the vertical force of the position law
 and from the torque of the arm's first joint, each against its value before the descent. Both are
-fused by their variances.
+fused by their variances. Whether the thrust suffices is judged by the mass before the pick, then by
+what is sent.
 """
 
 import math
@@ -12,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.grasp.grasp_parameters import GraspParameters
-from uam_control.grasp.sight import Sight
+from uam_control.grasp.sight import Lasting, Sight
 from uam_control.vehicle import GRAVITY
 from uam_control.vehicle.gripper import MAGNET, NO_GRIPPER, TWO_FINGER
 
@@ -21,6 +22,8 @@ TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
 SHARE = 0.5  # of the tool's travel that the payload must follow
 LEAST_TRAVEL = 0.02  # [m] on which that is based at least
 
+SHORT_AFTER = 0.3  # [s] at carry_throttle
+SUNK = 0.08  # [m] below the path
 REACH = 0.003  # [m] height above the payload below which the tool has contact
 SLACK = 0.1  # of the stroke, within which the fingers are at an end
 PRESSED = 0.5  # of the force limit: the fingers press on something
@@ -162,3 +165,37 @@ class Fingers(GripperKind):
 
 
 GRIPPERS = {NO_GRIPPER: GripperKind(), MAGNET: GripperKind(), TWO_FINGER: Fingers()}
+
+
+def expected_throttle(sight: Sight, mass: float) -> float:
+    """Return the thrust as sent, 0..1, with a further mass [kg]; NaN if unknown.
+
+    Thrust is proportional to it where THR_MDL_FAC is the motors', see `thrust_curve`.
+    """
+    return sight.throttle * (1.0 + mass * GRAVITY / sight.lift) if sight.lift > 0.0 else math.nan
+
+
+class ThrustReserve:
+    """`short`: whether the thrust has been at its end for SHORT_AFTER.
+
+    A rotor at its end shows late: the autopilot then takes thrust for its torques, the vehicle
+    sinks a little, and the thrust that is sent rises to 1.
+    """
+
+    def __init__(self) -> None:
+        self._at_end = Lasting()
+        self.short = False
+
+    def restart(self) -> None:
+        """Forget all values."""
+        self._at_end.restart()
+        self.short = False
+
+    def add(self, sight: Sight, p: GraspParameters) -> None:
+        """Take the next sight."""
+        lasts = self._at_end(sight.stamp, sight.throttle >= p.carry_throttle)
+        self.short = lasts >= SHORT_AFTER
+
+    def sinks(self, sight: Sight) -> bool:
+        """Return whether the vehicle sinks for want of thrust."""
+        return self.short and bool(sight.error[2] < -SUNK)

@@ -17,10 +17,12 @@ from uam_control.grasp.evidence import (
     Evidence,
     GripperKind,
     Load,
+    ThrustReserve,
     against,
     by_mass,
     by_pose,
     by_travel,
+    expected_throttle,
     fused,
     identified_mass,
     place,
@@ -28,7 +30,6 @@ from uam_control.grasp.evidence import (
 )
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import Lasting, RunningMean, Sight
-from uam_control.grasp.thrust_reserve import ThrustReserve, expected_throttle
 from uam_control.grasp.windows import FROM_ABOVE, GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken

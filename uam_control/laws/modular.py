@@ -26,7 +26,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from uam_control.laws import lyapunov
 from uam_control.laws.law import GainGroup, Law, LawInputs
 from uam_control.laws.law_parameters import LawParameters, ceiling
 from uam_control.maths.compiled import jit
@@ -104,9 +103,9 @@ class ModularParameters(LawParameters):
             )
 
     def lyapunov_matrix(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return p11, p12, p22, each (n,); see `lyapunov.solve`."""
+        """Return p11, p12, p22, each (n,); see `lyapunov_solution`."""
         given = (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
-        return lyapunov.solve(*map(np.array, given))
+        return lyapunov_solution(*map(np.array, given))
 
     def feedback_gains(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the gains on e [1/s^2] and on e_dot [1/s], each (n,), by `lambda_form`."""
@@ -285,3 +284,21 @@ class ModularLaw(Law):
         """Set K0..K3 and zeta to their initial values, eq. (13d), zeta1; (22d); (29d)."""
         self.adaptation[:4] = self.parameters.k_initial
         self.adaptation[ZETA] = self.parameters.zeta_initial
+
+
+def lyapunov_solution(
+    lambda_1: np.ndarray, lambda_2: np.ndarray, q_position: np.ndarray, q_velocity: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (p11, p12, p22), each (n,): P = [[diag p11, diag p12], [diag p12, diag p22]] > 0.
+
+    P solves A^T P + P A = -Q of one subsystem, in the text after eq. (7), err_variable_p; (17),
+    err_variable_q; (24), err_variable_alpha. With diagonal lambda_1, lambda_2 and Q the equation
+    splits into n of size two, A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position,
+    q_velocity).
+    All arguments have shape (n,) and are positive: lambda_1 [1/s^2], lambda_2 [1/s], the two halves
+    of Q's diagonal [1]. r of eq. (7), (17), (24) is B^T P xi = p12 e + p22 e_dot.
+    """
+    p12 = q_position / (2.0 * lambda_1)
+    p22 = (q_velocity + 2.0 * p12) / (2.0 * lambda_2)
+    p11 = lambda_2 * p12 + lambda_1 * p22
+    return p11, p12, p22

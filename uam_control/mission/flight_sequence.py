@@ -25,7 +25,6 @@ from uam_control.mission.mission_output import (
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.motion.trajectory import empty_reference
-from uam_control.mission.nominal_tick import REAL, WHOLE
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import Goal
 from uam_control.mission.pre_arm import ChecklistReport, PreArm
@@ -47,6 +46,9 @@ from uam_control.supervision import (
 from uam_control.supervision.checks import Checks
 from uam_control.vehicle import VehicleDescription
 
+# takes_off: whether the vehicle is not airborne yet. [s]: newest step, take-off; ground [m] below
+# it; height [m], speed [m/s] of a touchdown, and scenario time [s] from which on it is one
+WHOLE, REAL = "takes_off", "stamp takeoff ground height speed half"
 NOBODY = Authority()  # has taken control from the companion
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 

@@ -6,26 +6,43 @@ of the controllers never jumps.
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DOT, JERK, POSITION, YAW, X, Y, Z
+from uam_control.maths.compiled import borrowing
 from uam_control.maths.kept_tuple import bound
-from uam_control.maths.memory import Number, record
+from uam_control.maths.memory import Number, put, record
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission import rest
 from uam_control.mission.course import NEXT, Course, Cue
-from uam_control.mission.following import MOST, REAL, WHOLE, GuidanceArrays, publish
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
+from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
-from uam_control.mission.motion.segments import Segment, WayBack
+from uam_control.mission.motion.polynomials import HARDEST, PEAK
+from uam_control.mission.motion.segments import Segment, WayBack, arm_length, at_rest, stop_length
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion, write_motions
-from uam_control.mission.plans import BASE, BOTH, HARDEST, PEAK, Goal, Plan
+from uam_control.mission.plans import BASE, BOTH, Goal, Plan
 from uam_control.mission.scenarios.route import SINK
 
 COMING_BACK = (Course.BRAKE, Course.REST, Course.BACK)
+# following: number of the next of the motions ahead
+WHOLE, REAL = "following", "scenario_time gravity rate_max acceleration_max"
+MOST = 64  # motions ahead
 PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, see `Guidance.pace`
+
+
+class GuidanceArrays(NamedTuple):
+    """reference, motion: of `Guidance`; motions (MOST, 5, 6 + n), times (MOST,) [s]: ahead, on the
+    path; drag (3,) [1/s]; numbers (1,): WHOLE, REAL."""
+
+    reference: np.ndarray
+    motion: np.ndarray
+    motions: np.ndarray
+    times: np.ndarray
+    drag: np.ndarray
+    numbers: np.ndarray
 
 
 class Guidance:
@@ -247,7 +264,7 @@ class Guidance:
         acceleration [m/s^2]: in place of stop_acceleration. A descent ends: `stay` then sets the
         reference. A plan ends in a stop, too, on its curve.
         """
-        length = rest.ramp(self.motion, self.parameters, acceleration=acceleration)
+        length = stop_length(self.motion, self.parameters, acceleration=acceleration)
         for plan in self._plans.values():
             plan.stop(stamp, length)
         self._take(Cue.STOP)
@@ -299,7 +316,7 @@ class Guidance:
             self._brake = None
             offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
             offset[:, ARM] = 0.0
-            self._away = rest.way_back(stamp, offset, self.parameters)
+            self._away = WayBack(stamp, offset, self.parameters)
         if self._plans.pop(False, None) is not None or self._arm is not None:
             time = self._clock.at(self._due)[0]
             self.trajectory.write(time, self._path)
@@ -388,15 +405,33 @@ class Guidance:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
         p = self.parameters
         acceleration = p.stop_acceleration if self._brake is None else p.brake_acceleration
-        return rest.goal(self.motion, acceleration, p, self._stowed if stow else None)
+        return at_rest(self.motion, acceleration, p, self._stowed if stow else None)
 
     def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
         goal = self.motion[CHI].copy()
         goal[ARM] = angles
-        length = rest.arm_length(self.motion, angles, self.parameters)
+        length = arm_length(self.motion, angles, self.parameters)
         return Segment(stamp, self.motion, goal, np.full_like(goal, length))
 
     def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:
-        """Return the time [s] in which the path's clock stops or resumes; see `rest.ramp`."""
+        """Return the time [s] in which the path's clock stops or resumes; see `stop_length`."""
         self.trajectory.write(self.scenario_time, self._path)
-        return rest.ramp(self._path, self.parameters, shortest, acceleration)
+        return stop_length(self._path, self.parameters, shortest, acceleration)
+
+
+@borrowing
+def publish(a: GuidanceArrays) -> None:
+    """Write the motion to the reference, with the attitude that it needs."""
+    m = a.numbers[0]
+    write_reference(a.motion, a.drag, m.gravity, m.rate_max, m.acceleration_max, a.reference)
+
+
+@borrowing
+def follow_path(a: GuidanceArrays) -> None:
+    """Write the next motion that `Guidance.look_ahead` has computed, and its reference."""
+    m = a.numbers[0]
+    m.scenario_time = a.times[m.following]
+    for row in range(len(a.motion)):
+        put(a.motions[m.following, row], a.motion[row])
+    m.following += 1
+    publish(a)

@@ -18,7 +18,6 @@ from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, ROLL,
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.flatness import Flyer, flattened
-from uam_control.mission.plan_limits import room
 from uam_control.mission.plans import (
     BOTH,
     SAME,
@@ -29,6 +28,7 @@ from uam_control.mission.plans import (
     PlanRefused,
     Points,
     fill_differences,
+    room,
 )
 
 UPRIGHT = math.radians(80.0)  # lean from which on the heading is lost

@@ -6,20 +6,38 @@ sequence, and on which arrays.
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import CHI
+from uam_control.ages import SILENT
+from uam_control.coordinates import CHI, Z
+from uam_control.maths.compiled import borrowing
 from uam_control.mission.flight_sequence import FlightSequence
+from uam_control.mission.ground import on_ground
+from uam_control.mission.guidance import GuidanceArrays, follow_path
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import leaves_geofence
-from uam_control.mission.nominal_tick import MissionArrays
-from uam_control.mission.plan_limits import check
-from uam_control.mission.plans import Goal, PlanRefused
+from uam_control.mission.plans import Goal, PlanRefused, check
 from uam_control.supervision import Authority, Guide, OperatorCommand, State
+from uam_control.supervision.checks import CheckArrays, measure_all
+from uam_control.supervision.observation import NUMBERS, ReadingArrays
+from uam_control.supervision.supervisor import stays_behind
 from uam_control.vehicle import NO_GRIPPER, TWO_FINGER, closes
 
+AUTOPILOT_AGE = NUMBERS.index("autopilot_age")
 FOLLOWS = (State.TAKING_OFF, State.FLYING, State.LANDING)  # states that follow the scenario
+
+
+class MissionArrays(NamedTuple):
+    """State of a `Mission`: of its guidance and checks; supervisor, watch, numbers (1,): memory of
+    its supervisor, its `PayloadWatch` and itself, see `flight_sequence`."""
+
+    guidance: GuidanceArrays
+    checks: CheckArrays
+    supervisor: np.ndarray
+    watch: np.ndarray
+    numbers: np.ndarray
 
 
 class Mission(FlightSequence):
@@ -224,3 +242,29 @@ class Mission(FlightSequence):
         """Scenario time [s] from which on the executive of the grasps is due."""
         off = self._parameters.grasp_checks == "off" or self.output.state is not State.FLYING
         return math.inf if off else self._watch.executive.due_from
+
+
+@borrowing
+def follow_scenario(
+    a: MissionArrays, readings: ReadingArrays, stamp: float, state: np.ndarray
+) -> bool:
+    """Do what `Mission.step` does at `stamp` [s], after `Mission.look_ahead`.
+
+    state (3, 6 + n). Returns False, and changes nothing, where something is to be decided.
+    """
+    m, path, s = a.numbers[0], a.guidance, a.supervisor[0]
+    calm = measure_all(a.checks, state, path.reference, m.ground, readings, True)
+    late = path.times[path.numbers[0].following] >= m.half
+    if not calm or (late and on_ground(state, m.ground, m.height, m.speed)):
+        return False
+    if readings.values[AUTOPILOT_AGE] > SILENT:  # the arm may give way, see `Mission`
+        return False
+    if m.takes_off:
+        planned = path.reference[CHI, Z] - m.ground
+        airborne = state[CHI, Z] - m.ground > s.airborne_height
+        if airborne or stays_behind(a.supervisor, stamp, planned):
+            return False
+    m.stamp = stamp
+    s.stamp = stamp
+    follow_path(path)
+    return True

@@ -17,14 +17,14 @@ from uam_control.grasp import (
     Sight,
     grasp_windows,
 )
-from uam_control.grasp.kinematics import PlaceHistory, hand_and_levers
+from uam_control.grasp.sight import PlaceHistory, hand_and_levers
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.polynomials import PEAK
 from uam_control.mission.motion.segments import Segment
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
-from uam_control.mission.plans import PEAK
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.supervision import Readings
 

@@ -12,20 +12,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.path_clock import STEADY, PathClock, scale
-from uam_control.mission.motion.polynomials import quintic, quintic_at
+from uam_control.mission.motion.polynomials import RAMP, quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
 BOTH = slice(None)  # those of base and arm
-PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
 LONGER = 1.01  # precision of a blend's length
 TINY = 1e-9  # [m/s]
 SAME = 1e-3  # [m, rad, s or their rates] by which equal goals may differ
-HARDEST = 5.7735  # its largest acceleration, times length / duration^2
-RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
+MIN_STEP = 0.004  # [s] shortest time between two points
+MOST_POINTS = 500  # of a trajectory; the check of more takes longer than a tick
+ROUNDING = 1e-9  # [m or rad] beyond a limit
 AT_REST = 1e-3  # [m/s or rad/s] rate of a last point that counts as zero
 
 
@@ -349,10 +349,6 @@ class Points(Goal):
             raise PlanRefused("a position is not finite")
 
 
-MIN_STEP = 0.004  # [s] shortest time between two points
-MOST_POINTS = 500  # of a trajectory; the check of more takes longer than a tick
-
-
 def fill_differences(times: np.ndarray, points: np.ndarray, start: np.ndarray) -> None:
     """Replace rows of points (3, m, k) that are NaN by central differences.
 
@@ -380,3 +376,64 @@ def _stopped(
     last = np.zeros((3, 1, points.shape[2]))
     last[CHI, 0] = points[CHI, -1] + points[CHI_DOT, -1] * length / 2
     return np.append(times, times[-1] + length), np.concatenate([points, last], axis=1)
+
+
+def room(p: MissionParameters, ground: float) -> np.ndarray:
+    """Return the corners (2, 3) [m] of the base's room; ground [m]: height at take-off."""
+    found = p.room(ground)
+    found[0, Z] = max(found[0, Z], ground + p.airborne_height)
+    return found
+
+
+def check(plan: Plan, p: MissionParameters, ground: float) -> None:
+    """Raise PlanRefused if the plan leaves a limit anywhere; ground [m]: height at take-off.
+
+    A plan that begins beyond a limit of position or angle may come back, but not go further.
+    """
+    times = plan.samples()
+    values = plan.at(times)
+    if plan.columns is BASE:
+        names, unit = ("x", "y", "z"), "m"
+        low, high = room(p, ground)
+        within = values[CHI, :, POSITION]
+    else:
+        names, unit = [f"alpha_{i + 1}" for i in range(values.shape[2])], "rad"
+        (low, high), within = p.joint_ranges, values[CHI]
+    low_now, high_now = np.minimum(low, within[0]), np.maximum(high, within[0])
+    for i, name in enumerate(names):
+        beyond = np.maximum(low_now[i] - within[:, i], within[:, i] - high_now[i])
+        k, end = int(np.argmax(beyond)), within[-1, i]
+        if not low[i] - ROUNDING <= end <= high[i] + ROUNDING:
+            k = len(times) - 1
+        elif beyond[k] <= ROUNDING:
+            continue
+        raise PlanRefused(
+            f"{name} is {within[k, i]:.2f} {unit} after {times[k]:.1f} s, "
+            f"allowed {low[i]:g} to {high[i]:g} {unit}"
+        )
+    for what, found, limit, unit in _rates(plan, values, p):
+        k = int(np.argmax(found))
+        if found[k] > limit:
+            raise PlanRefused(
+                f"{what} is {found[k]:.2f} {unit} after {times[k]:.1f} s, allowed {limit:g} {unit}"
+            )
+
+
+def _rates(plan: Plan, values: np.ndarray, p: MissionParameters) -> list[tuple]:
+    """Return (quantity, values (q,), limit, unit) of the rates of a plan's samples (3, q, k)."""
+    if plan.columns is ARM:
+        rate, acceleration = (np.abs(values[row]).max(axis=1) for row in (CHI_DOT, CHI_DDOT))
+        return [
+            ("joint rate", rate, p.plan_joint_rate, "rad/s"),
+            ("joint acceleration", acceleration, p.plan_joint_acceleration, "rad/s^2"),
+        ]
+    speed, acceleration = (
+        np.linalg.norm(values[row, :, POSITION], axis=1) for row in (CHI_DOT, CHI_DDOT)
+    )
+    yaw_rate, yaw_acceleration = (np.abs(values[row, :, YAW]) for row in (CHI_DOT, CHI_DDOT))
+    return [
+        ("speed", speed, p.plan_speed, "m/s"),
+        ("acceleration", acceleration, p.plan_acceleration, "m/s^2"),
+        ("yaw rate", yaw_rate, p.plan_yaw_rate, "rad/s"),
+        ("yaw acceleration", yaw_acceleration, p.plan_yaw_acceleration, "rad/s^2"),
+    ]

@@ -10,7 +10,7 @@ from uam_control.control.hand_steering import IDLE, TEXTS
 from uam_control.control.output_limits import ArmLimits
 from uam_control.coordinates import ARM
 from uam_control.nodes.controller_node import ControllerNode, run_alone
-from uam_control.stages.hand_stage import HandStage
+from uam_control.stages.law_stages import HandStage
 from uam_control.vehicle import POSITION_SERVO
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import TorqueWriter

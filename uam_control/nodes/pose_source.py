@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 
-from uam_control.estimation.estimator_parameters import ODOMETRY, PoseSourceParameters
-from uam_control.estimation.pose_anchor import RETURN, PoseAnchor
+from uam_control.estimation.pose_anchor import ODOMETRY, RETURN, PoseAnchor, PoseSourceParameters
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_pose

@@ -27,13 +27,14 @@ from uam_control.stages import estimator_stage, mission_stage, supervisor_inputs
 from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.bridge_stage import BridgeStage, sending
 from uam_control.stages.estimator_stage import EstimatorStage
-from uam_control.stages.hand_stage import HandStage, hand_step
 from uam_control.stages.law_stages import (
+    HandStage,
     LawStage,
     MeasuredDelay,
     WholeBodyStage,
     arm_step,
     attitude_step,
+    hand_step,
     position_step,
     whole_body_step,
 )

@@ -9,8 +9,8 @@ import numpy as np
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Number, record
 from uam_control.mission import Mission
-from uam_control.mission.following import MOST
-from uam_control.mission.nominal_tick import MissionArrays, follow_scenario
+from uam_control.mission.guidance import MOST
+from uam_control.mission.mission import MissionArrays, follow_scenario
 from uam_control.stages.autopilot_port import AutopilotReport
 from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs

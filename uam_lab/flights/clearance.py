@@ -11,7 +11,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM, CHI, CHI_DDOT, POSITION, YAW, Z
 from uam_control.grasp import grasp_windows
-from uam_control.grasp.kinematics import hand_and_levers
+from uam_control.grasp.sight import hand_and_levers
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.mission import Scenario, ScenarioError
 from uam_control.mission.motion.flatness import attitudes

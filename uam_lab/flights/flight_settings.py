@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from uam_control.estimation.estimator_parameters import MOCAP, ODOMETRY
+from uam_control.estimation.pose_anchor import MOCAP, ODOMETRY
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
 from uam_control.profiles.profile import Profile, complete_profile, default_profile, load_profile
 from uam_control.setpoints.setpoint_types import WRENCH

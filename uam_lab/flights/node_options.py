@@ -18,7 +18,7 @@ from uam_control.profiles.profile import (
 )
 from uam_control.settings.section import Section
 from uam_control.vehicle.description import servo_of
-from uam_control.vehicle.plant_numbers import NOT_OF_THE_PLANT, check_plant_numbers
+from uam_control.vehicle.loading import NOT_OF_THE_PLANT, check_plant_numbers
 from uam_lab.records.results.metrics import plain
 
 # nodes whose parameters are in no profile

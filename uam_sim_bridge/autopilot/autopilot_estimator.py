@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.ages import UNAIDED
-from uam_control.estimation.waiting import value_at
+from uam_control.estimation.pose_filter import value_at
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import (

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from uam_control.ages import STALE
-from uam_control.estimation.estimator_parameters import PoseSourceParameters
+from uam_control.estimation.pose_anchor import PoseSourceParameters
 from uam_control.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_control.offboard.offboard_parameters import OffboardParameters
 from uam_control.profiles.profile import BRIDGE, Profile

@@ -13,6 +13,8 @@ ROWS = 5  # value, rate, acceleration, jerk, snap
 # A move from rest to rest whose rate, acceleration, jerk and snap are zero at both ends, degree 9:
 PEAK_RATE = 315.0 / 128.0  # its largest rate, times distance / duration
 PEAK_ACCELERATION = 9.372  # its largest acceleration, times distance / duration^2
+# The same of a quintic, and the largest slope of a cubic times its mean slope
+PEAK, HARDEST, RAMP = 1.875, 5.7735, 1.5
 
 
 class Polynomials:

@@ -21,7 +21,7 @@ import numpy as np
 
 from uam_control.control.output_limits import RateLimits
 from uam_control.coordinates import ROLL, YAW
-from uam_control.laws import lyapunov
+from uam_control.laws.modular import lyapunov_solution
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
 from uam_control.settings.section import read_section
@@ -245,7 +245,7 @@ def _feedback(
     """
     whole = _law(criteria.feedback.stiffness * second**2, second, criteria, share, fixed)
     given = ("lambda_1", "lambda_2", "q_position", "q_velocity")
-    _, p12, p22 = lyapunov.solve(*(np.array(whole[name]) for name in given))
+    _, p12, p22 = lyapunov_solution(*(np.array(whole[name]) for name in given))
     gamma = criteria.feedback.integral * second**3 / p12
     first = np.array(whole["lambda_1"]) - gamma * p22
     q_position = 2.0 * first * p12

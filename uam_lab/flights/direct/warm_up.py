@@ -13,8 +13,7 @@ import numpy as np
 from uam_control.arm.hand import hands
 from uam_control.arm.kinematics import ORIGIN, gravity_torque, mass_matrix
 from uam_control.coordinates import ALPHA
-from uam_control.grasp.kinematics import hand_and_levers
-from uam_control.grasp.sight import RunningMean
+from uam_control.grasp.sight import RunningMean, hand_and_levers
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
 from uam_control.maths.compiled import on_disk

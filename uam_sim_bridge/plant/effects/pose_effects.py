@@ -14,7 +14,7 @@ import numpy as np
 from uam_control.estimation.pose_anchor import PLACE, YAW, moved
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
-from uam_control.vehicle.plant_numbers import LARGEST_RATE, LEAST_RATE
+from uam_control.vehicle.loading import LARGEST_RATE, LEAST_RATE
 from uam_sim_bridge.plant.effects.effect import Acting, Bench, Compiled, Effect, size
 from uam_sim_bridge.plant.sensors import Noise, next_row
 
