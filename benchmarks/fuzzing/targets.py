@@ -18,7 +18,7 @@ from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import ThrustIdentification, identify
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
@@ -268,8 +268,8 @@ class Plant:
 
     def __init__(self, rng: random.Random, counts: Counter) -> None:
         self._counts = counts
-        waits = HilParameters(answer_timeout=0.001, silent_timeout=0.0005)
-        self._server = HilServer(0, 4, parameters=waits)
+        waits = 0.001, 0.0005
+        self._server = HilServer(0, 4, waits=waits)
         self._server._link, self._far = socket.socketpair()
         self._far.setblocking(False)
         self._server._link.setblocking(False)

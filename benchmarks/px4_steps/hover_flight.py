@@ -21,7 +21,7 @@ from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap
 from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import WAITS, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
@@ -57,10 +57,10 @@ class HoverFlight:
         self._arm = ArmController(profile.sets["arm_controller"])
         self._map = RateThrustMap()
         self._sequence = OffboardSequence()
-        waits = HilParameters()
+        waits = WAITS
         if always_answers:
-            waits = HilParameters(silent_timeout=waits.answer_timeout)
-        self._hil = HilServer(ports.simulator_tcp, len(vehicle.rotors), parameters=waits)
+            waits = WAITS[0], WAITS[0]
+        self._hil = HilServer(ports.simulator_tcp, len(vehicle.rotors), waits=waits)
         self._transport = UdpTransport(ports.offboard_udp, (HOST, ports.autopilot_udp))
         self.system = ports.instance + 1  # MAVLink system id of the autopilot
         self._link = OffboardLink(

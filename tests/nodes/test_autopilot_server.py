@@ -20,14 +20,14 @@ from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParam
 from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot import server
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Signing, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 from uam_sim_bridge.ports import PortError
 
 START_TIMEOUT = 60.0  # s: a first start compiles
-PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # for a loaded machine
+PATIENT = 30.0, 10.0  # for a loaded machine
 HOVER = MASS * 9.81
 
 
@@ -40,7 +40,7 @@ class Flight:
     def __init__(self, start, signing=None, arguments=()):
         self.tcp, self.udp = free_port(), free_port()
         self.local = free_port()
-        self.hil = HilServer(self.tcp, 4, parameters=PATIENT)
+        self.hil = HilServer(self.tcp, 4, waits=PATIENT)
         self.server = start(
             MODULE,
             "--once",
@@ -306,7 +306,7 @@ class FakeAutopilot:
 
 @pytest.fixture
 def pair():
-    server = HilServer(0, 4, parameters=HilParameters(answer_timeout=0.2, silent_timeout=0.01))
+    server = HilServer(0, 4, waits=(0.2, 0.01))
     fake = FakeAutopilot(server._listener.getsockname()[1])
     assert server.accept(5.0)
     yield server, fake

@@ -19,7 +19,7 @@ from uam_control.offboard.sequence import OffboardSequence, Phase
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
 from uam_control.setpoints.targets import AttitudeTarget, VisionPose
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
@@ -27,8 +27,8 @@ from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 ROUTER, AUTOPILOT = "uam_sim_bridge.mavlink.hil.router", "uam_sim_bridge.autopilot.server"
 PATIENCE = 60.0  # s for a process to start: the stand-in compiles
 # the server waits this long only for a frame that invalid bytes have cut short
-HIL = HilParameters(answer_timeout=2.0, silent_timeout=0.5)
-PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)
+HIL = 2.0, 0.5
+PATIENT = 30.0, 10.0
 
 
 class Cable:
@@ -71,7 +71,7 @@ class Bench:
         self.cable = Cable()
         tcp, self.udp = free_port(), free_port()
         local = free_port()
-        self.hil = HilServer(tcp, 4, parameters=hil)
+        self.hil = HilServer(tcp, 4, waits=hil)
         self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
         self.autopilot.until_logged("on the serial line")
         self.router = start(

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.vehicle.rotor_geometry import normalised_mixer, torque_scale
-from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
+from uam_sim_bridge.autopilot.cycle import allocate, unallocated_torque
 
 PX = np.array([0.171, -0.171, 0.171, -0.171])
 PY = np.array([0.171, -0.171, -0.171, 0.171])

@@ -6,8 +6,7 @@ import pytest
 
 from uam_control.offboard.modes import MavResult, Mode, Severity
 from uam_control.vehicle import load_description
-from uam_sim_bridge.autopilot.battery import ChargeState, SimulatedBattery
-from uam_sim_bridge.autopilot.commander import Commander
+from uam_sim_bridge.autopilot.commander import ChargeState, Commander, SimulatedBattery
 from uam_sim_bridge.autopilot.params import Parameters
 
 CENTRED, PUSHED = (0.0, 0.0, 0.0, 0.0), (0.31, 0.0, 0.0, 0.0)  # COM_RC_STICK_OV is 30 %

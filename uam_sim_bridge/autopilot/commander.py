@@ -1,4 +1,4 @@
-"""Arming, modes and failsafe: PX4's rules (v1.16).
+"""Arming, modes and failsafe: PX4's rules (v1.16); the simulated battery, PX4's SIM_BAT_*.
 
 | event | rule |
 |---|---|
@@ -24,17 +24,63 @@ released within COM_KILL_DISARM; then disarm; arming is refused |
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 
 import numpy as np
 
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.memory import Number, record
 from uam_control.offboard.modes import MavResult, Mode, Severity
-from uam_sim_bridge.autopilot.battery import ChargeState
+from uam_control.settings.plain_members import plain_members
 from uam_sim_bridge.autopilot.params import Parameters
 
 STREAM_GAP = 0.5  # s, longest interval between two setpoints of a stream (2 Hz)
 STREAM_TIME = 0.5  # s, shortest duration of a stream before OFFBOARD
+
+
+@plain_members
+class ChargeState(IntEnum):
+    """MAV_BATTERY_CHARGE_STATE: the values in use. `LOW` and worse are PX4's warnings."""
+
+    UNDEFINED = 0
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+
+
+class SimulatedBattery:
+    """The state of charge falls linearly while armed. `charge`: 0..1, None if not simulated."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._full_since: float | None = None  # [s]
+        self.charge: float | None = None
+
+    def update(self, time: float, armed: bool) -> None:
+        """Advance to `time` [s]."""
+        p = self._parameters
+        if not p["SIM_BAT_ENABLE"]:
+            self.charge = self._full_since = None
+            return
+        if not armed or self._full_since is None:
+            self._full_since = time
+        used = (time - self._full_since) / p["SIM_BAT_DRAIN"]
+        self.charge = max(1.0 - used, 0.01 * p["SIM_BAT_MIN_PCT"])
+
+    @property
+    def state(self) -> ChargeState:
+        """Return the state that the charge has by BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR."""
+        p, charge = self._parameters, self.charge
+        if charge is None:
+            return ChargeState.UNDEFINED
+        if charge < p["BAT_EMERGEN_THR"]:
+            return ChargeState.EMERGENCY
+        if charge < p["BAT_CRIT_THR"]:
+            return ChargeState.CRITICAL
+        return ChargeState.LOW if charge < p["BAT_LOW_THR"] else ChargeState.OK
+
+
 BATTERY_WARNINGS = {
     ChargeState.LOW: "Low battery",
     ChargeState.CRITICAL: "Critical battery",

@@ -25,8 +25,7 @@ from uam_control.vehicle import load_description
 from uam_control.vehicle.rotor_geometry import normalised_mixer
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
-from uam_sim_bridge.autopilot.battery import SimulatedBattery
-from uam_sim_bridge.autopilot.commander import Commander
+from uam_sim_bridge.autopilot.commander import Commander, SimulatedBattery
 from uam_sim_bridge.autopilot.cycle import (
     LONGEST_STEP,
     SHORTEST_STEP,

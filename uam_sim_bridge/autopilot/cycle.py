@@ -1,6 +1,11 @@
-"""The compiled cycle of the autopilot stand-in: rate loop, motors, and an external pose.
+"""The compiled cycle of the autopilot stand-in: rate loop, allocation, and an external pose.
 
 All vectors are FRD and NED; times [s] are those of the sensor samples.
+
+Allocation: normalised torques and thrust → motor thrusts, as in PX4's control allocator. The mixer
+is `rotor_geometry.normalised_mixer`, motor order and signs are those of PX4's CA_ROTORn. Saturation
+is removed in this order (PX4: sequential desaturation, MC_AIRMODE = 0): collective down, then roll
+and pitch, then yaw with a margin, then collective down again.
 """
 
 from __future__ import annotations
@@ -12,8 +17,8 @@ import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit
 from uam_control.setpoints.thrust_curve import inverse_curve
+from uam_control.vehicle.rotor_geometry import PITCH, ROLL, THRUST, YAW
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, EstimatorArrays, fuse, predict
-from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
     TORQUE,
@@ -25,6 +30,8 @@ from uam_sim_bridge.autopilot.loops.rate_control import (
 FARTHEST_VISION = 1e5  # m
 HOVER_TIME, HOVER_RANGE = 1.0, 0.2  # [s] of a mean; largest change (PX4: HTE_THR_RANGE)
 LEAST_LIFT = 0.3 * GRAVITY  # [m/s^2] specific force from which the thrust of hover is learned
+YAW_MARGIN = 0.15  # of the motor range, kept for yaw at full thrust (PX4: minimum yaw margin)
+WEAK = 0.2  # mixer entries below this do not desaturate (PX4)
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
@@ -64,6 +71,78 @@ def control_tick(
         return
     rate_torque(setpoint, dt, filters, gains, landed, memory)
     drive_motors(setpoint[3], loop)
+
+
+@borrowing
+def _desaturate(
+    motors: np.ndarray, mixer: np.ndarray, axis: int, upper: float, down_only: bool
+) -> None:
+    """Move motors (n,) along one mixer column to remove saturation, or balance it at both ends."""
+    for attempt in range(2):
+        low = 0.0
+        high = 0.0
+        for i in range(motors.shape[0]):
+            entry = mixer[i, axis]
+            if abs(entry) < WEAK:
+                continue
+            step = 0.0
+            if motors[i] < 0.0:
+                step = -motors[i] / entry
+            elif motors[i] > upper:
+                step = (upper - motors[i]) / entry
+            low = min(low, step)
+            high = max(high, step)
+        gain = low + high
+        if attempt == 0 and down_only and gain > 0.0:
+            return
+        if attempt == 1:
+            gain *= 0.5  # the second pass removes half of the remaining saturation
+        for i in range(motors.shape[0]):
+            motors[i] += gain * mixer[i, axis]
+
+
+@borrowing
+def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.ndarray) -> None:
+    """Write the motor thrusts 0..1 into `motors` (n,).
+
+    torque (3,): normalised, FRD; thrust: normalised collective, up; mixer (n, 4):
+    `normalised_mixer`.
+    """
+    count = motors.shape[0]
+    for i in range(count):
+        motors[i] = (
+            mixer[i, ROLL] * torque[0] + mixer[i, PITCH] * torque[1] + mixer[i, THRUST] * thrust
+        )
+    _desaturate(motors, mixer, THRUST, 1.0, True)
+    _desaturate(motors, mixer, ROLL, 1.0, False)
+    _desaturate(motors, mixer, PITCH, 1.0, False)
+    for i in range(count):
+        motors[i] += mixer[i, YAW] * torque[2]
+    _desaturate(motors, mixer, YAW, 1.0 + YAW_MARGIN, False)
+    _desaturate(motors, mixer, THRUST, 1.0, True)
+    for i in range(count):
+        motors[i] = min(1.0, max(0.0, motors[i]))
+
+
+@borrowing
+def unallocated_torque(
+    torque: np.ndarray, motors: np.ndarray, inverse_mixer: np.ndarray, out: np.ndarray
+) -> None:
+    """Write into out (3,) the part of torque (3,) that motors (n,) do not make; normalised, FRD.
+
+    inverse_mixer (4, n): pseudo-inverse of the normalised mixer. All three are zero if the sum of
+    squares is below 1e-6, as in PX4's allocator status.
+    """
+    total = 0.0
+    for axis in range(3):
+        made = 0.0
+        for i in range(motors.shape[0]):
+            made += inverse_mixer[axis, i] * motors[i]
+        out[axis] = torque[axis] - made
+        total += out[axis] * out[axis]
+    if total < 1e-6:
+        for axis in range(3):
+            out[axis] = 0.0
 
 
 @borrowing

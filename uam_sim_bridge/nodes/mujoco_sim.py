@@ -44,7 +44,7 @@ from uam_msgs_py.node.tunable import TunableNode
 from uam_msgs_py.node.wiring import Connections, connection_counts
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
+from uam_sim_bridge.mavlink.hil.hil_server import WAITS, HilServer, open_only_here
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.lockstep import Awaited, Lockstep, PlantStopped
@@ -112,7 +112,7 @@ class Simulator:
         self.executor = LeanExecutor(node, last, lambda: self._lockstep.any_input_wakes)
         patience = self._limit = options.answer_timeout or math.inf  # [s] of a wait
         rotors = len(described.rotors)
-        waits = HilParameters(answer_timeout=min(patience, SILENT))
+        waits = min(patience, SILENT), WAITS[1]
         address = options.hil_address
         self.hil = HilServer(options.hil_port, rotors, address, waits, options.seed)
         if not open_only_here(address):

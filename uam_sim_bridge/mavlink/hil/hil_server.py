@@ -1,23 +1,23 @@
 """The simulator's side of the HIL link: a TCP server to which an autopilot (PX4 SITL, or the
 stand-in) connects. Each tick sends HIL_SENSOR and waits for HIL_ACTUATOR_CONTROLS.
 
-The wait is limited by `answer_timeout` if the autopilot answered the last tick, else by
-`silent_timeout`. PX4 sends no answer during boot and while disarmed without a setpoint stream.
+The wait is limited by the first of WAITS if the autopilot answered the last tick, else by the
+second. PX4 sends no answer during boot and while disarmed without a setpoint stream.
 """
 
 import ipaddress
 import select
 import socket
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.hil.hil_messages import HilMessages
 from uam_sim_bridge.paced_clock import SLICE, Patience
 from uam_sim_bridge.ports import PortError, bound
+
+WAITS = 2.0, 0.05  # [s] of wall time
 
 
 def open_only_here(address: str) -> bool:
@@ -33,18 +33,6 @@ def open_only_here(address: str) -> bool:
         ) from None
 
 
-@dataclass(frozen=True)
-class HilParameters(ParameterSet):
-    """Time limits of the HIL link (wall time)."""
-
-    answer_timeout: float = number(
-        2.0, "longest wait for an answer after an answered tick", "s", 0.001, 60.0
-    )
-    silent_timeout: float = number(
-        0.05, "longest wait for an answer after a tick without answer", "s", 0.0005, 10.0
-    )
-
-
 class HilServer(HilMessages):
     """TCP server for one autopilot at a time.
 
@@ -57,13 +45,15 @@ class HilServer(HilMessages):
         port: int,
         motors: int,
         host: str = "127.0.0.1",
-        parameters: HilParameters | None = None,
+        waits: tuple[float, float] = WAITS,
         seed: int = 0,
     ) -> None:
-        """Listen on TCP `port` for `motors` motors; seed: of the noise. Raises PortError if the
-        port is in use."""
+        """Listen on TCP `port` for `motors` motors; waits [s]: see WAITS; seed: of the noise.
+
+        Raises PortError if the port is in use.
+        """
         super().__init__(motors, seed)
-        self.parameters = (parameters or HilParameters()).validated()
+        self._waits = waits
         self.answered = False
         self.missed = 0
         self._ever = False
@@ -91,7 +81,7 @@ class HilServer(HilMessages):
         if self._link is None:
             return
         try:
-            self._link.settimeout(self.parameters.answer_timeout)
+            self._link.settimeout(self._waits[0])
             self._link.sendall(data)
             self._link.setblocking(False)
         except OSError:
@@ -103,14 +93,13 @@ class HilServer(HilMessages):
         """Wait for the answer to the last `send`; return `motors` (n,), also without an answer.
 
         Without a connection, or if the autopilot closes it, the motors are zero. timeout: wall time
-        [s]; None for `answer_timeout` or `silent_timeout` (module docstring). going_on: called
+        [s]; None for one of `waits` (module docstring). going_on: called
         while it waits; False ends the wait.
         """
         if self._link is None:
             return self.motors
         if timeout is None:
-            p = self.parameters
-            timeout = p.answer_timeout if self.answered else p.silent_timeout
+            timeout = self._waits[0] if self.answered else self._waits[1]
         self.answered = False
         patience = Patience(timeout)
         while not self.answered and going_on():
