@@ -10,6 +10,7 @@ import pytest
 from default_columns import COLUMNS
 
 from uam_control.settings import configuration
+from uam_control.vehicle import load_description
 from uam_lab.cli.main import main
 from uam_lab.experiments.faults import matrix as fault_matrix
 from uam_lab.experiments.faults import report as fault_report
@@ -23,6 +24,7 @@ from uam_lab.report.page import pages
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError
 
 MATRIX = configuration.path("campaign/faults.yaml")
+GRIPPER = load_description("s500_gripper")
 
 
 def record(begin, end, name="motor_loss", **values):
@@ -200,6 +202,25 @@ def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, message):
     out, err = capsys.readouterr()
     assert message in err and err.count("\n") == 1 and not out
     assert not any(tmp_path.iterdir())
+
+
+def test_what_another_scenario_or_vehicle_does_not_have_is_left_out_with_its_reason(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "{scenario: quick_pick, moments: {a: {at: take-off}, b: {at: drop}}, faults: ["
+        "{fault: servo_jam, joint: 3}, {fault: mocap_jump}, {fault: magnet_stuck, moments: [b]}]}"
+    )
+    matrix = fault_matrix.read(file, "direct", scenario="two_finger", vehicle=GRIPPER)
+    assert [cell.fault for cell in matrix.cells(1)] == [fault_matrix.NOMINAL, "mocap_jump"]
+    assert list(matrix.moments) == ["a"]
+    assert matrix.left_out["b"].startswith("no phase 'drop' in two_finger, which has: take-off,")
+    assert matrix.left_out["servo_jam (joint 3)"] == "servo_jam: joint 3: the vehicle has 2"
+    assert matrix.left_out["magnet_stuck"] == "magnet_stuck: none of its moments: b"
+    with pytest.raises(FaultError, match="nothing to fly: .*the vehicle has 2"):
+        fault_matrix.read(file, "direct", only=["servo_jam"])
+    file.write_text(file.read_text().replace("a: {at: take-off}", "a: {at: pick}"))
+    with pytest.raises(FaultError, match="moments: no phase 'pick' in hover"):
+        fault_matrix.read(file, "direct", scenario="hover")
 
 
 def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):

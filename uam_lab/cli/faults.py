@@ -44,7 +44,7 @@ from uam_lab.flights.flight_settings import require_ros
 from uam_lab.flights.vehicle.lab_file import TEMPLATE, load_lab, settings_of
 from uam_lab.records.results.result_folder import make_folder
 from uam_lab.records.results.terminal import say
-from uam_sim_bridge.faults import fault_catalogue, feasibility
+from uam_sim_bridge.faults import fault_catalogue
 from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
 
@@ -111,9 +111,9 @@ def run(options: argparse.Namespace) -> int:
     file = configuration.named("campaign", options.matrix)
     given = (options.engine, options.only, options.moment, options.scenario)
     matrix = fault_matrix.read(file, *given, vehicle, options.draws or 0)
+    for name, why in matrix.left_out.items():
+        say(f"left out: {name}: {why}")
     cells = matrix.cells(options.seed, options.repeat)
-    for cell in cells:
-        feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
     kind = "cables" if rehearsed else "faults"
     mass = load_scenario(matrix.scenario, vehicle).payload_mass
     changes = presets.added({}, chosen_effects(options))

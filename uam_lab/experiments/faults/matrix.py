@@ -5,20 +5,19 @@ moments, with one of its durations. A value [low, high] in the file is drawn bet
 """
 
 import math
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from uam_control.mission import Scenario, load_scenario
+from uam_control.mission import load_scenario
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.outcome import OUTCOMES
-from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
-from uam_sim_bridge.faults.feasibility import needs_nodes
-from uam_sim_bridge.faults.schedule import listed, timed
+from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule, feasibility
+from uam_sim_bridge.faults.schedule import TimedFault, listed, timed
 
 NOMINAL = "no fault"
 KEYS = ("scenario", "moments", "faults")
@@ -78,14 +77,15 @@ class Cell:
 @dataclass(frozen=True)
 class Matrix:
     """Flights of a campaign. moments: entries with the times by name; promises: one per row;
-    left_out: rows that the engine cannot fly; own_moments: of each row, () for all. draws: number
-    of random flights in place of one per cell, with `durations` for rows without their own."""
+    left_out: row or moment → why this flight cannot have it; own_moments: of each row, () for all.
+    draws: number of random flights in place of one per cell, with `durations` for rows without
+    their own."""
 
     scenario: str
     moments: dict[str, dict[str, Any]]
     faults: tuple[dict[str, Any], ...]
     promises: tuple[Promise | None, ...]
-    left_out: tuple[str, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
     own_moments: tuple[tuple[str, ...], ...] = ()
     draws: int = 0
     durations: tuple[Any, ...] = ()
@@ -162,7 +162,8 @@ def read(
     """Read a matrix for an engine. Raises FaultError, ConfigurationError, ScenarioError.
 
     only: names of faults, () for all; moments: names of columns, () for all; scenario: instead of
-    the file's; vehicle: None for the default one; draws: see `Matrix`.
+    the file's, moments of phases that it does not have are left out; vehicle: None for the default
+    one; draws: see `Matrix`.
     """
     top = read_section(file, FaultError)
     top.only((*KEYS, DURATIONS))
@@ -171,15 +172,22 @@ def read(
     lasting, where = document.get(DURATIONS, []), str(file)
     if not isinstance(lasting, list):
         raise FaultError(f"{where}: {DURATIONS}: a list of times [s] expected, null for good")
-    times = _moments(document["moments"], load_scenario(name, vehicle), where, draws)
+    times = _moments(document["moments"], where)
+    phases = load_scenario(name, vehicle).phase_names
+    out = _without_phase(times, phases, name) if scenario else {}
+    times = {moment: when for moment, when in times.items() if moment not in out}
+    if not times:
+        raise FaultError(f"{where}: moments: {next(iter(out.values()))}")
+    _check_times(times, phases, where, draws)
     entries = listed(document["faults"], where)
     longer = [
         dict(entry) if one is None else {**entry, "duration": one}
         for entry in entries
         for one in (lasting if lasting and "duration" not in entry else [entry.get("duration")])
     ]
-    checked = [_checked(entry, where, times, draws) for entry in longer]
-    rows = [_checked(dict(entry), where, times, draws) for entry in entries] if draws else checked
+    every = {*times, *out}
+    checked = [_checked(entry, where, every, draws) for entry in longer]
+    rows = [_checked(dict(entry), where, every, draws) for entry in entries] if draws else checked
     for given, known in ((only, FAULTS), (moments, times)):
         for one in given:
             if one not in known:
@@ -188,15 +196,51 @@ def read(
                     f"there are: {', '.join(known)}"
                 )
     selected = [row for row in rows if not only or row.entry["fault"] in only]
-    out = [label(row.entry) for row in selected if engine == "direct" and needs_nodes(row.fault)]
-    kept = [row for row in selected if label(row.entry) not in out]
+    kept = []
+    for row in selected:
+        if why := _impossible(row, engine, vehicle, times):
+            out[label(row.entry)] = why
+        else:
+            kept.append(row)
     if not kept:
-        raise FaultError(f"{file}: nothing to fly with the {engine} engine")
+        reasons = dict.fromkeys(out.values())
+        raise FaultError(f"{file}: nothing to fly: {'; '.join(reasons)}")
     chosen = {k: v for k, v in times.items() if not moments or k in moments}
     entries, promises = tuple(row.entry for row in kept), tuple(row.promise for row in kept)
-    own = tuple(row.moments for row in kept)
+    own = tuple(tuple(one for one in row.moments if one in times) for row in kept)
     drawn = (draws, tuple(lasting)) if draws else ()
-    return Matrix(name, chosen, entries, promises, tuple(out), own, *drawn)
+    return Matrix(name, chosen, entries, promises, out, own, *drawn)
+
+
+class _Row(NamedTuple):
+    entry: dict[str, Any]
+    fault: Fault
+    promise: Promise | None
+    moments: tuple[str, ...]
+
+
+def _without_phase(
+    times: Mapping[str, Mapping[str, Any]], phases: Collection[str], scenario: str
+) -> dict[str, str]:
+    """Return the moments at a phase that the scenario does not have, each with the reason."""
+    return {
+        moment: f"no phase '{at}' in {scenario}, which has: {', '.join(phases)}"
+        for moment, when in times.items()
+        if isinstance(at := when.get("at"), str) and at not in phases
+    }
+
+
+def _impossible(
+    row: _Row, engine: str, vehicle: VehicleDescription | None, times: Collection[str]
+) -> str:
+    """Return why these flights cannot have the fault of a row, "" if they can."""
+    try:
+        feasibility.check(Schedule((TimedFault(row.fault, 0.0),)), engine, vehicle=vehicle)
+    except FaultError as error:
+        return str(error)
+    if row.moments and not set(row.moments) & set(times):
+        return f"{row.fault.NAME}: none of its moments: {', '.join(row.moments)}"
+    return ""
 
 
 def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, Any]]:
@@ -211,24 +255,22 @@ def _ends(entry: dict[str, Any], draws: int, where: str) -> Iterator[dict[str, A
         yield entry | {key: value[end] for key, value in ranges.items()}
 
 
-def _moments(given: Any, scenario: Scenario, where: str, draws: int) -> dict[str, dict[str, Any]]:
-    """Return the checked times of the moments; they are written like times of faults."""
+def _moments(given: Any, where: str) -> dict[str, dict[str, Any]]:
+    """Return the times of the moments; they are written like times of faults."""
     mappings = isinstance(given, dict) and [isinstance(when, dict) for when in given.values()]
     if not mappings or not all(mappings):
         raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
-    any_fault = next(iter(FAULTS))
-    for name, when in given.items():
-        at = f"{where}: moments: {name}"
-        for one in _ends(when, draws, at):
-            timed({**one, "fault": any_fault}, scenario.phase_names, at)
     return {str(name): when for name, when in given.items()}
 
 
-class _Row(NamedTuple):
-    entry: dict[str, Any]
-    fault: Fault
-    promise: Promise | None
-    moments: tuple[str, ...]
+def _check_times(
+    times: Mapping[str, dict[str, Any]], phases: Collection[str], where: str, draws: int
+) -> None:
+    any_fault = next(iter(FAULTS))
+    for name, when in times.items():
+        at = f"{where}: moments: {name}"
+        for one in _ends(when, draws, at):
+            timed({**one, "fault": any_fault}, phases, at)
 
 
 def _checked(entry: dict[str, Any], where: str, moments: Collection[str], draws: int = 0) -> _Row:

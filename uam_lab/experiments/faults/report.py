@@ -174,7 +174,8 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, comma
         f"{outcomes}.",
     ]
     if matrix.left_out:
-        parts.append(f"Only with --engine ros: {'; '.join(matrix.left_out)}.")
+        out = (f"{name}: {why}" for name, why in matrix.left_out.items())
+        parts.append(f"Left out: {'; '.join(out)}.")
     return "\n\n".join([*parts, f"Made by `{command}`."]) + "\n"
 
 
