@@ -17,11 +17,11 @@ import numpy as np
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from uam_control.coordinates import CHI
+from uam_control.coordinates import ARM, CHI
 from uam_control.mission.time_limit import FlightEnd
+from uam_control.nodes.described import described_vehicle
 from uam_control.settings.atomic import write_text
 from uam_control.stamps import SECOND
-from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, PoseWriter
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
@@ -31,7 +31,8 @@ from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_files import write_json
-from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_msgs_py.node.rightful import rightful_nodes
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge import hardware_priority
 from uam_sim_bridge.devices.dynamixel.chain import hardware_file, load_chain
@@ -41,7 +42,6 @@ from uam_sim_bridge.laboratory.laboratory import Laboratory
 from uam_sim_bridge.laboratory.laboratory_parameters import TOPIC, LaboratoryParameters
 from uam_sim_bridge.laboratory.person import Person
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.nodes.plant_options import declare_laboratory
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
@@ -99,10 +99,14 @@ class Statistics:
 class Rehearsal:
     """Laboratory, its topics and its person, tick by tick."""
 
-    def __init__(
-        self, node: Node, vehicle: VehicleDescription, p: LaboratoryParameters, stop: StopSignal
-    ) -> None:
-        self._node, self._p, self._stop = node, p, stop
+    def __init__(self, node: TunableNode, stop: StopSignal) -> None:
+        """Raises ValueError, KeyError, OSError: bad parameters, or a port in use."""
+        vehicle = described_vehicle(node)
+        rightful_nodes(node)  # declares `publishers`, which every node of a flight has
+        joints = vehicle.coordinates[ARM]
+        p = NodeParameters(node, LaboratoryParameters, joints, read_only=True).current
+        refuse_unknown(node)
+        self._node, self._stop, self.parameters = node, stop, p
         numbers = Vehicle.of(vehicle).changed(p.changes())
         faults = Schedule.from_text(p.faults).only(CABLE)
         p.places.mkdir(parents=True, exist_ok=True)
@@ -142,8 +146,8 @@ class Rehearsal:
         gc.freeze()
         numbers.fifo_priority = hardware_priority.prefer()
         clock.begin()
-        begin, end = time.monotonic(), FlightEnd(self._p.linger)
-        limit, latest = self._p.flight_limit or math.inf, math.inf
+        begin, end = time.monotonic(), FlightEnd(self.parameters.linger)
+        limit, latest = self.parameters.flight_limit or math.inf, math.inf
         text = f"time limit of {limit:g} s after arming"
         while not self._stop.raised and not numbers.ended_by:
             clock.note(lab.plant.tick)
@@ -198,7 +202,7 @@ class Rehearsal:
             self._list = state
 
     def _be_the_person(self, chi: np.ndarray) -> None:
-        if not self._p.person:
+        if not self.parameters.person:
             return
         now = self.lab.plant.time
         self.lab.grip = self._person.update(now, self._list.step, chi)
@@ -240,10 +244,8 @@ def main() -> int:
 
 
 def _rehearse(node: TunableNode, stop: StopSignal) -> int:
-    vehicle, parameters = declare_laboratory(node)
-    refuse_unknown(node)
     try:
-        rehearsal = Rehearsal(node, vehicle, parameters, stop)
+        rehearsal = Rehearsal(node, stop)
     except (ValueError, KeyError, OSError) as error:
         return refuse(NAME, error)
     try:
@@ -251,7 +253,7 @@ def _rehearse(node: TunableNode, stop: StopSignal) -> int:
         rehearsal.run()
         return 0
     finally:
-        write_json(node, parameters.statistics, rehearsal.report())
+        write_json(node, rehearsal.parameters.statistics, rehearsal.report())
         rehearsal.close()
 
 

@@ -28,8 +28,10 @@ from functools import partial
 
 from std_srvs.srv import Trigger
 
-from uam_control.coordinates import POSITION
+from uam_control.coordinates import ARM, POSITION
 from uam_control.mission.time_limit import FlightEnd
+from uam_control.nodes.described import described_vehicle
+from uam_control.settings.process_parameters import TickTimesParameters
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
@@ -38,7 +40,8 @@ from uam_msgs_py.node.answering import offer
 from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_files import write_json
-from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_msgs_py.node.rightful import rightful_nodes
 from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
 from uam_msgs_py.node.wiring import Connections, connection_counts
@@ -46,10 +49,10 @@ from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import WAITS, HilServer, open_only_here
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.nodes.latencies import Latencies
+from uam_sim_bridge.nodes.latencies import Statistics
 from uam_sim_bridge.nodes.lockstep import Awaited, Lockstep, PlantStopped
 from uam_sim_bridge.nodes.plant_health import PlantHealth
-from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
+from uam_sim_bridge.nodes.plant_options import NOT_READY, PlantParameters
 from uam_sim_bridge.nodes.plant_topics import (
     Answers,
     RecorderProgress,
@@ -81,14 +84,18 @@ class NotReady(PlantStopped):
 class Simulator:
     """Plant, topics and autopilot link, tick by tick."""
 
-    def __init__(self, node: TunableNode, declared: Options, stop: StopSignal):
-        options = declared.parameters
+    def __init__(self, node: TunableNode, stop: StopSignal):
+        """Raises ValueError, OSError: bad parameters, or a port in use."""
+        described, rightful = described_vehicle(node), rightful_nodes(node)
+        joints = described.coordinates[ARM]
+        options = NodeParameters(node, PlantParameters, joints, read_only=True).current
+        times = NodeParameters(node, TickTimesParameters, read_only=True).current
+        refuse_unknown(node)
         self.node, self.options, self._stop = node, options, stop
         self._log = node.get_logger()
         named = presets.read(tuple(filter(None, options.plant_preset.split(","))))
         changes = presets.added({}, named) | options.changes()
-        vehicle = Vehicle.of(declared.vehicle).changed(changes)
-        described = vehicle.description
+        vehicle = Vehicle.of(described).changed(changes)
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)
         self._make = partial(make_plant, *start, faults, options.plant)
@@ -99,15 +106,15 @@ class Simulator:
         self._reset_due = False
         offer(node, Trigger, "~/reset", self._on_reset)
         warm_up(make_plant(*start, Schedule(), options.plant))
-        self._times = tick_times(declared.tick_times)
+        self._times = tick_times(times)
         self._odometry = OdometryDrift.NAME in vehicle.numbers["effects"]
         sensors = node, described, options.publish_imu, self._times, self._odometry
         self.sensors = Sensors(*sensors)
         self.truth = TruthTopics(node, described)
         servo_mode = vehicle.numbers["servos"]["mode"]
-        self.answers = Answers(node, described, declared.rightful, servo_mode)
+        self.answers = Answers(node, described, rightful, servo_mode)
         self.connections = Connections(node)
-        self.recorded = RecorderProgress(node, declared.rightful)
+        self.recorded = RecorderProgress(node, rightful)
         last = [topics.SETPOINT.name]
         self.executor = LeanExecutor(node, last, lambda: self._lockstep.any_input_wakes)
         patience = self._limit = options.answer_timeout or math.inf  # [s] of a wait
@@ -120,7 +127,7 @@ class Simulator:
                 f"TCP port {options.hil_port} is open at {address}: every machine that reaches it "
                 "can take the autopilot's place, without a password"
             )
-        self.statistics = Statistics(options.clock)
+        self.statistics = Statistics(options.clock, self.plant.period)
         self.health = PlantHealth(node, self.answers, self.statistics)
         pairs = [entry.partition("=") for entry in options.foreign.split(",") if entry]
         self._own_names = {node: name or node for node, _, name in pairs}
@@ -137,7 +144,6 @@ class Simulator:
         self._begun = 0.0  # wall time [s] at which this tick began
         latest = options.let_go or math.inf
         self._clock = PacedClock(self.plant.period, catch_up=CATCH_UP, latest=latest)
-        self._latencies = Latencies(self.statistics, self.plant.period)
 
     def wait_for_nodes(self) -> None:
         """Return when all nodes are connected to each other, and the autopilot to this node."""
@@ -348,14 +354,14 @@ class Simulator:
     def _measure(self) -> None:
         """Measure the latency of this tick, and of ticks whose setpoints have arrived."""
         stamp = self._stamp if self.options.publish_imu else self.node.stamp
-        self._latencies.tick(stamp, self._published, self.answers.setpoints)
+        self.statistics.tick(stamp, self._published, self.answers.setpoints)
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:
         """Return the statistics so far; unanswered ticks count once their deadline is over."""
         numbers = self.statistics
         numbers.ticks, numbers.simulated_s = self.plant.tick, self.plant.time
-        self._latencies.conclude(self._published)
+        numbers.conclude(self._published)
         numbers.late_motor_commands = self.hil.missed
         return numbers
 
@@ -384,10 +390,8 @@ def main() -> int:
 
 
 def _simulate(node: TunableNode, stop: StopSignal) -> int:
-    options = declare(node)
-    refuse_unknown(node)
     try:
-        simulator = Simulator(node, options, stop)
+        simulator = Simulator(node, stop)
     except (ValueError, OSError) as error:
         return refuse(NAME, error)
     try:
@@ -400,7 +404,7 @@ def _simulate(node: TunableNode, stop: StopSignal) -> int:
         return NOT_READY if isinstance(error, NotReady) else 1
     finally:
         simulator.close()
-        write_json(node, options.parameters.statistics, simulator.report().to_mapping())
+        write_json(node, simulator.options.statistics, simulator.report().to_mapping())
 
 
 if __name__ == "__main__":

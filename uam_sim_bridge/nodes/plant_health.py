@@ -9,7 +9,7 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import label
-from uam_sim_bridge.nodes.plant_options import Statistics
+from uam_sim_bridge.nodes.latencies import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
 WAITING = "waiting for "  # begins the summary while time stands still

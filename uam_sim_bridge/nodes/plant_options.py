@@ -1,28 +1,9 @@
-"""Parameters of plant node and laboratory as declared, and statistics of the former."""
+"""Parameters of the plant node."""
 
-from __future__ import annotations
+from dataclasses import dataclass
 
-from array import array
-from dataclasses import asdict, dataclass, field, replace
-
-from rclpy.node import Node
-
-from uam_control.coordinates import ARM
-from uam_control.nodes.described import described_vehicle
-from uam_control.settings.parameter_set import (
-    choice,
-    number,
-    switch,
-    text,
-)
-from uam_control.settings.process_parameters import TickTimesParameters
-from uam_control.vehicle import VehicleDescription
-from uam_msgs_py.node.node_parameters import NodeParameters
-from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
-from uam_sim_bridge.laboratory.laboratory_parameters import (
-    LaboratoryParameters,
-    SimulatedParameters,
-)
+from uam_control.settings.parameter_set import choice, number, switch, text
+from uam_sim_bridge.laboratory.laboratory_parameters import SimulatedParameters
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 
@@ -90,51 +71,3 @@ class PlantParameters(SimulatedParameters):
     time_limit: float = number(
         0.0, "simulation time at which the flight ends in any case, 0 = never", "s", 0.0, 1e6
     )
-
-
-@dataclass(frozen=True)
-class Options:
-    """The vehicle, the parameters of the plant node, and who may publish its inputs."""
-
-    vehicle: VehicleDescription
-    parameters: PlantParameters
-    rightful: RightfulNodes
-    tick_times: TickTimesParameters
-
-
-def declare(node: Node) -> Options:
-    """Declare the parameters and return their values. Raises ParameterError for a bad one."""
-    vehicle = described_vehicle(node)
-    joints = vehicle.coordinates[ARM]
-    declared = NodeParameters(node, PlantParameters, joints, read_only=True).current
-    times = NodeParameters(node, TickTimesParameters, read_only=True).current
-    return Options(vehicle, declared, rightful_nodes(node), times)
-
-
-@dataclass
-class Statistics:
-    """Statistics of the flight, written at the end."""
-
-    clock: str
-    ticks: int = 0
-    simulated_s: float = 0.0
-    wall_s: float = 0.0
-    answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which require a setpoint
-    missed_ticks: int = 0
-    late_ticks: int = 0
-    late_motor_commands: int = 0
-    latency_s: array[float] = field(default_factory=lambda: array("f"))  # 4 bytes: long flights
-    ended_by: str = ""
-
-    def to_mapping(self) -> dict[str, object]:
-        """Return the values for JSON; latencies rounded to the microsecond."""
-        latencies = [round(value, 6) for value in self.latency_s]
-        return asdict(replace(self, latency_s=array("f"))) | {"latency_s": latencies}
-
-
-def declare_laboratory(node: Node) -> tuple[VehicleDescription, LaboratoryParameters]:
-    """Declare the parameters; return vehicle and values. Raises ParameterError."""
-    vehicle = described_vehicle(node)
-    rightful_nodes(node)  # declares `publishers`, which every node of a flight has
-    joints = vehicle.coordinates[ARM]
-    return vehicle, NodeParameters(node, LaboratoryParameters, joints, read_only=True).current
