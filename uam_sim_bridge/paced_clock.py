@@ -85,5 +85,4 @@ class Patience:
 
     @property
     def over(self) -> bool:
-        """Return whether no time is left."""
         return self.left == 0.0

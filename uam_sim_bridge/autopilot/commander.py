@@ -146,7 +146,6 @@ class Commander:
         self._say(severity, "Kill engaged" if engaged else "Kill disengaged")
 
     def terminate(self) -> MavResult:
-        """Handle a request for flight termination."""
         if not self.armed:
             return MavResult.DENIED
         self.mode = self.intended = Mode.TERMINATION
@@ -229,7 +228,6 @@ class Commander:
         return MavResult.ACCEPTED
 
     def request_disarm(self, landed: bool, force: bool) -> MavResult:
-        """Handle a request to disarm."""
         if self.armed and not landed and not force:
             self._say(Severity.CRITICAL, "Disarming denied: not landed")
             return MavResult.TEMPORARILY_REJECTED

@@ -171,7 +171,6 @@ class Autopilot:
         self.commander.sticks(time, sticks, self.estimator.aided(time))
 
     def kill_switch(self, engaged: bool) -> None:
-        """Handle the pilot's kill switch."""
         self.commander.kill(engaged, self.landing.landed)
 
     def command(self, time: float, command: int, parameters: tuple[float, ...]) -> MavResult:

@@ -214,7 +214,6 @@ class JoinedAutopilot(FlightState):
             self._send(OTHER, lambda: self._command(request))
 
     def send_vision(self, pose: VisionPose) -> None:
-        """Send a mocap pose."""
         self._send(POSE, np.array([pose.stamp, *pose.position, *pose.quaternion]))
 
     def send_setpoint(self, target: Target, time: float) -> None:

@@ -33,7 +33,6 @@ class LandDetector:
         return self._since == [math.inf] * 3
 
     def configure(self, parameters: Parameters) -> None:
-        """Take the thresholds from the autopilot's parameters."""
         least, hover = parameters["MPC_THR_MIN"], parameters["MPC_THR_HOVER"]
         self.low = least + _LOW_THRUST * (hover - least)
         self._none_descending = least + _NO_THRUST * (hover - least)

@@ -105,7 +105,6 @@ class Parameters:
         self._values[name] = float(value)
 
     def vector(self, *names: str) -> list[float]:
-        """Return the values of several names."""
         return [self._values[name] for name in names]
 
     def rotors(self) -> tuple[list[float], list[float], list[float]]:

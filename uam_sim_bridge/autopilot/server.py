@@ -70,7 +70,6 @@ class CompanionLine:
         self._codec, self._framer = codec, Framer(codec)
 
     def receive(self) -> list[Message]:
-        """Return all received messages."""
         chunks = self._transport.receive()
         return [message for data in chunks for message in self._framer.stream(data)]
 
@@ -80,7 +79,6 @@ class CompanionLine:
             self._transport.send(self._codec.encode(message))
 
     def close(self) -> None:
-        """Close the device."""
         self._transport.close()
 
 
@@ -211,7 +209,6 @@ class Server:
 
 
 def parser() -> Program:
-    """Return the parser of the command line."""
     p = Program(__doc__)
     p.ports()
     p.vehicle()

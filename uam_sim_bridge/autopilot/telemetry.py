@@ -28,7 +28,6 @@ FASTEST = {mavlink2.MAVLINK_MSG_ID_CURRENT_MODE: 0.5}  # [s] of it, besides each
 
 
 def heartbeat(autopilot: Autopilot, time: float) -> Message:
-    """HEARTBEAT of a PX4 quadrotor."""
     status = autopilot.status
     state = _CRITICAL if status.failsafe else _ACTIVE if status.armed else _STANDBY
     state = _TERMINATED if status.killed else state
@@ -123,7 +122,6 @@ def estimator_status(autopilot: Autopilot, time: float) -> Message:
 
 
 def timesync(autopilot: Autopilot, time: float) -> Message:
-    """TIMESYNC request."""
     return mavlink2.MAVLink_timesync_message(0, round(time * 1e9))
 
 

@@ -27,7 +27,6 @@ class Fault(NamedSet):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Return the parameters by name."""
         return asdict(self)
 
 

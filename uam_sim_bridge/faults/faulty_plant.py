@@ -93,7 +93,6 @@ class FaultyPlant(Plant):
 
     @property
     def tick(self) -> int:
-        """The tick of the inner plant."""
         return self._physics.tick
 
     @tick.setter
@@ -140,7 +139,6 @@ class FaultyPlant(Plant):
         return self.timeline.unchanged_for(self.time) / self.period
 
     def _changed(self, samples: Samples) -> Samples:
-        """Return the samples, changed by the active faults."""
         for fault, now in self._occurring():
             fault.sense(samples, now)
         return samples
@@ -164,7 +162,6 @@ class FaultyPlant(Plant):
         self._physics.step(motor_commands, arm_command, magnet)
 
     def truth(self) -> Truth:
-        """Return the truth of the inner plant."""
         return self._physics.truth()
 
 

@@ -24,7 +24,6 @@ class FaultState:
 
     @property
     def fault(self) -> Fault:
-        """Return the fault."""
         return self.planned.fault
 
     @property

@@ -117,7 +117,6 @@ class HilLine(HilMessages):
         return self.motors
 
     def close(self) -> None:
-        """Remove the device."""
         self._terminal.close()
 
     def _take(self) -> None:

@@ -218,7 +218,6 @@ class Laboratory:
         return (level is not p.active_low) is not inverted
 
     def close(self) -> None:
-        """Close every device."""
         self.hil.close()
         self.mocap.stop()
         self.cable.close()

@@ -276,6 +276,5 @@ def _described_chain(hardware: str, device: str, vehicle: VehicleDescription) ->
 
 
 def main() -> int:
-    """Run the node; return its exit status."""
     sys.setswitchinterval(SWITCH)
     return run(ArmDriverNode, NAME)

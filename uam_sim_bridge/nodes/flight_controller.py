@@ -138,5 +138,4 @@ def spin(
 
 
 def main() -> int:
-    """Run the nodes; return the exit status."""
     return run_together(make, NAME, spin)

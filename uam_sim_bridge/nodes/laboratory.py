@@ -71,7 +71,6 @@ class DriverTopic:
             self._publisher.publish(self._writer.fill(round((time + shift) * SECOND), *values))
 
     def close(self) -> None:
-        """Destroy the node."""
         self._own.destroy_node()
 
 
@@ -225,7 +224,6 @@ class Rehearsal:
         return asdict(numbers)
 
     def close(self) -> None:
-        """Close devices and nodes."""
         self.lab.close()
         self._executor.shutdown()
         for driver in (self._imu, self._poses):

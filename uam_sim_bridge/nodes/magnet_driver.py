@@ -55,7 +55,6 @@ class MagnetDriverNode(UamNode):
         self._said = problem
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        """Return the level, the state, and how often the line was switched."""
         driver, now = self._line.device, time.monotonic()
         if driver is None:
             return ERROR, self._line.problem, {"line": self._chip}
@@ -75,5 +74,4 @@ class MagnetDriverNode(UamNode):
 
 
 def main() -> int:
-    """Run the node; return its exit status."""
     return run(MagnetDriverNode, NAME)

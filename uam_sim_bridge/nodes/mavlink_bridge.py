@@ -131,7 +131,6 @@ class MavlinkBridgeNode(UamNode):
         self.link.parameters.set_mapping(parameters)
 
     def destroy_node(self) -> None:
-        """Close the link, then the node."""
         if hasattr(self, "link"):
             if getattr(self, "_magnet", None) is not None:
                 self._magnet.end(self.stamp / SECOND)
@@ -378,5 +377,4 @@ def _plain(value: float | tuple[float, ...]) -> float | list[float]:
 
 
 def main() -> int:
-    """Run the node; return its exit status."""
     return run(MavlinkBridgeNode, NAME)

@@ -81,7 +81,6 @@ class MocapDriverNode(UamNode):
             self.get_logger().error(text)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        """Return the level, one line, and latency, losses and clocks."""
         driver = self._system.device
         if driver is None:
             return ERROR, self._system.problem, {}
@@ -89,7 +88,6 @@ class MocapDriverNode(UamNode):
         return LEVELS[level], text, driver.values()
 
     def destroy_node(self) -> None:
-        """Close the connection, then the node."""
         system = getattr(self, "_system", None)
         if system is not None and system.device is not None:
             system.device.close()
@@ -97,5 +95,4 @@ class MocapDriverNode(UamNode):
 
 
 def main() -> int:
-    """Run the node; return its exit status."""
     return run(MocapDriverNode, NAME)

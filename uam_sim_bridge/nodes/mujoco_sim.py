@@ -366,7 +366,6 @@ class Simulator:
         return numbers
 
     def close(self) -> None:
-        """Close the link to the autopilot."""
         self._times.close()
         self.hil.close()
         self.executor.shutdown()

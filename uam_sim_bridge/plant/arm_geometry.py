@@ -57,7 +57,6 @@ def carriers(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
-    """Return whether the model has a part of this kind and name."""
     return mujoco.mj_name2id(model, kind, name) >= 0
 
 

@@ -92,7 +92,6 @@ def mavlink_script(companion: str, baud: int, usb: str = "") -> str:
 
 
 def parser() -> Program:
-    """Return the parser of the command line."""
     p = Program(__doc__)
     p.instance()
     p.option("--companion", "DEVICE:BAUD", "the companion's line, as TELEM2", required=True)

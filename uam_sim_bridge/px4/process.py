@@ -137,7 +137,6 @@ def ended(program: str, status: int) -> int:
 
 
 def say_kept(program: str, kept: Sequence[Path]) -> None:
-    """Say where PX4's logs are."""
     names = ", ".join(str(file) for file in kept) or "PX4 wrote none"
     print(f"{program}: log: {names}", flush=True)
 

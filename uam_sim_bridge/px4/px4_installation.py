@@ -46,12 +46,10 @@ class Px4Installation:
 
     @property
     def binary(self) -> Path:
-        """Return the path of the program."""
         return self.directory / "bin" / "px4"
 
     @property
     def etc(self) -> Path:
-        """Return the directory of the start-up scripts."""
         return self.directory / "etc"
 
     def ranges(self) -> dict[str, Range]:

@@ -64,7 +64,6 @@ def _connected(pid: int, port: int) -> bool:
 
 
 def parser() -> Program:
-    """Return the parser of the command line."""
     p = Program(__doc__)
     p.instance()
     add_px4_options(p, REQUIRED)

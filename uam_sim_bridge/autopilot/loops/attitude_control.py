@@ -145,7 +145,6 @@ class Descent:
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
-        """Take the gains from the autopilot's parameters."""
         self._speed, self._gain, self._integral_gain = parameters.vector(
             "MPC_LAND_SPEED", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC"
         )
@@ -156,7 +155,6 @@ class Descent:
         )
 
     def reset(self) -> None:
-        """Clear the memory."""
         self._integral = 0.0  # acceleration [m/s^2] down
         self._blind = 0.0  # s without a valid vertical velocity
 

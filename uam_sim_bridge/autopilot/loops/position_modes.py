@@ -45,14 +45,12 @@ class PositionControl:
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
-        """Take the gains from the autopilot's parameters."""
         p = self._parameters = parameters
         self._position_gain = _gains(p, "P")
         self._p, self._i, self._d = (_gains(p, f"VEL_{kind}_ACC") for kind in "PID")
         self._attitude_gains = attitude_gains(p)
 
     def reset(self) -> None:
-        """Clear the memory."""
         if self._velocity is not None:
             self._integral[:], self._slope[:], self._velocity = 0.0, 0.0, None
 
@@ -175,14 +173,12 @@ class PositionModes:
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
-        """Take the gains from the autopilot's parameters."""
         p = self._parameters = parameters
         self._position_gain = _gains(p, "P")
         self._velocity_gain, self._integral_gain = (_gains(p, f"VEL_{kind}_ACC") for kind in "PI")
         self._attitude_gains = attitude_gains(p)
 
     def reset(self) -> None:
-        """Clear the memory."""
         self._mode, self.sinking = None, False
 
     def update(self, mode: Mode, estimate: np.ndarray, dt: float, hover: float) -> np.ndarray:

@@ -84,7 +84,6 @@ class Overdue:
         self._waiting: deque[tuple[float, Instruction]] = deque()
 
     def __bool__(self) -> bool:
-        """Return whether answers are overdue."""
         while self._waiting and self._waiting[0][0] < self._clock() - LATEST:
             self._waiting.popleft()
         return bool(self._waiting)
@@ -154,7 +153,6 @@ class DynamixelBus:
         self.open()
 
     def close(self) -> None:
-        """Close the device."""
         self.port.close()
 
     @contextmanager

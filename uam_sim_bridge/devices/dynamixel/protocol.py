@@ -64,7 +64,6 @@ def word(value: int, size: int) -> bytes:
 
 
 def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
-    """Return the bytes of a status packet."""
     return Packet(servo, STATUS, bytes([error]) + parameters).encode()
 
 

@@ -190,7 +190,6 @@ class MocapDriver:
             raise MocapError(missing)
 
     def close(self) -> None:
-        """Close the source."""
         self._source.close()
 
     def receive(self, timeout: float) -> list[StampedPose]:

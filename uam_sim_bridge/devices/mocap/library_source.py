@@ -101,7 +101,6 @@ class LibrarySource:
         return Frame(arrival, None, None, None, dict.fromkeys(self._seen) | poses)
 
     def close(self) -> None:
-        """End the process."""
         process, self._process = self._process, None
         if process is None:
             return

@@ -39,7 +39,6 @@ class ServerInfo(NamedTuple):
 
 
 def request(message: int) -> bytes:
-    """Return the packet of a request."""
     content = b"Ping\0" if message == CONNECT else b"\0"
     return HEADER.pack(message, len(content)) + content
 

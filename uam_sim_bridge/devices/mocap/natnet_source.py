@@ -91,7 +91,6 @@ class NatNetSource:
         return found
 
     def close(self) -> None:
-        """Close the sockets."""
         self._commands.close()
         if self._data is not None:
             self._data.close()

@@ -90,7 +90,6 @@ class DeviceThread:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
-        """Begin to serve."""
         self._thread.start()
 
     def end(self) -> None:
@@ -156,7 +155,6 @@ class Wire:
         return self._under_way[0][0] if self._under_way else None
 
     def clear(self) -> None:
-        """Lose the bytes under way."""
         self._under_way.clear()
         self.held = 0
 
@@ -194,7 +192,6 @@ class SerialCable:
                 self._ends[0] = PseudoTerminal(self.near)
 
     def close(self) -> None:
-        """End the thread and remove the devices."""
         self._thread.end()
         for end in (0, 1):
             self._remove(end)

@@ -35,7 +35,6 @@ class SerialPort:
         self.byte_time = BITS_PER_BYTE / baud_rate
 
     def close(self) -> None:
-        """Close the device."""
         if self._serial is not None:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.close()

@@ -62,7 +62,6 @@ class HilServer(HilMessages):
 
     @property
     def connected(self) -> bool:
-        """Return whether an autopilot is connected."""
         return self._link is not None
 
     def accept(self, timeout: float) -> bool:
@@ -114,7 +113,6 @@ class HilServer(HilMessages):
         return self.motors
 
     def close(self) -> None:
-        """Close the connection and release the port."""
         self._stop()
         self._listener.close()
 

@@ -240,7 +240,6 @@ def _stop(*_: object) -> None:
 
 
 def parser() -> Program:
-    """Return the parser of the command line."""
     p = Program(__doc__)
     p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
     text = "highest rate of HIL_SENSOR (default: the rate that the line carries, up to 250)"

@@ -36,7 +36,6 @@ class UdpPort:
         self._silence: Patience | None = None  # of the peer; None: before the first message
 
     def receive(self) -> list[Message]:
-        """Return all received messages."""
         messages: list[Message] = []
         silent = self._silence is None or self._silence.over
         while True:
@@ -66,11 +65,9 @@ class UdpPort:
             pass
 
     def fileno(self) -> int:
-        """Return the socket's file descriptor, for select."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Release the port."""
         self._socket.close()
 
 
@@ -150,13 +147,11 @@ class Program(argparse.ArgumentParser):
         self.add_argument(flag, help=text, action="store_true")
 
     def instance(self) -> None:
-        """Add the option of the instance number."""
         text = "PX4 instance number, added to the default ports (default %(default)s)"
         kind = whole("an instance number", 0, 254)
         self.add_argument("-i", "--instance", type=kind, default=0, metavar="N", help=text)
 
     def vehicle(self) -> None:
-        """Add the option of the vehicle."""
         text = "description, as in config/vehicle/"
         self.option("--vehicle", "NAME|FILE", text, DEFAULT_VEHICLE)
 

@@ -220,11 +220,9 @@ class OffboardLink(FlightState):
         self._send(setpoint_message(target, time, self._target))
 
     def send_vision(self, pose: VisionPose) -> None:
-        """Send a mocap pose."""
         self._send(vision_message(pose))
 
     def close(self) -> None:
-        """Close the transport."""
         self.transport.close()
 
     def values(self) -> dict[str, str | int | None]:

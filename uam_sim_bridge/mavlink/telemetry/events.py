@@ -79,7 +79,6 @@ class EventMessage(mavlink2.MAVLink_message):
         self.arguments = arguments
 
     def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
-        """Return the frame."""
         values = (getattr(self, name) for name in _ON_THE_WIRE[1:])
         payload = self.unpacker.pack(self.event, *values)
         return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)

@@ -201,7 +201,6 @@ class ParameterWatch(ParameterReader):
         super().__init__(names, self.required.instead, spoken.integers_as_bytes)
 
     def restart(self) -> None:
-        """Discard all values and request them again."""
         super().restart()
         self._writes.clear()
         self._compare()

@@ -32,7 +32,6 @@ class Difference(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Return the difference in one line."""
         if self.found is None:
             return f"{self.name} was not answered, {self.required} required: {self.why}"
         return f"{self.name} is {self.found:.9g}, {self.required} required: {self.why}"

@@ -170,6 +170,5 @@ class GroundStation(WrappedTransport):
                     self.held_back += 1
 
     def close(self) -> None:
-        """Close both links."""
         self.inner.close()
         self._station.close()

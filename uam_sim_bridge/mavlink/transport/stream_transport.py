@@ -68,7 +68,6 @@ class StreamTransport:
         return False
 
     def receive(self) -> list[bytes]:
-        """Return the chunks that have arrived."""
         chunks, left = [], READ_LIMIT
         while left > 0 and self._ready() and (self._flush() or self.connected):
             try:

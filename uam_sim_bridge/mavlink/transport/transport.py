@@ -98,11 +98,9 @@ class UdpTransport:
         return datagrams
 
     def fileno(self) -> int:
-        """Return the socket's file descriptor, for select."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Release the port."""
         self._socket.close()
 
 

@@ -216,7 +216,6 @@ class EmulatedBus:
             self._terminal = None
 
     def close(self) -> None:
-        """End the thread and remove the device."""
         self._thread.end()
         self.unplug()
 

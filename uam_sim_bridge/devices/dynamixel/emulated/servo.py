@@ -82,7 +82,6 @@ class EmulatedServo:
 
     @property
     def id(self) -> int:
-        """Its id."""
         return self.get(names.ID)
 
     @property
@@ -101,7 +100,6 @@ class EmulatedServo:
         return protocol.ALERT if self.get(names.HARDWARE_ERROR) else 0
 
     def get(self, name: str, signed: bool = False) -> int:
-        """Return the value of a register."""
         return int.from_bytes(self.table[name].of(self._memory, 0), "little", signed=signed)
 
     def set(self, name: str, value: int) -> None:

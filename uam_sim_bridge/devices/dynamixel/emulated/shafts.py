@@ -88,7 +88,6 @@ class JointShaft:
         )
 
     def drive(self, drive: Drive) -> None:
-        """Take the drive of the servo."""
         with self._lock:
             self._drive = drive
 

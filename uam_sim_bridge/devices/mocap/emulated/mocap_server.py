@@ -99,7 +99,6 @@ class MocapServer:
         self.stop()
 
     def start(self) -> None:
-        """Begin to serve."""
         self._thread.start()
 
     def stop(self) -> None:

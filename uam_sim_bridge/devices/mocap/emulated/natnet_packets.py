@@ -34,7 +34,6 @@ class Stamps(NamedTuple):
 
 
 def packet(message: int, content: bytes) -> bytes:
-    """Return a packet with its header."""
     return struct.pack("<HH", message, len(content)) + content
 
 
