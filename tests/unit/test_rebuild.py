@@ -38,3 +38,9 @@ def test_the_folder_of_another_flight_is_refused(rehearsed, tmp_path):
         rebuild(rehearsed, other)
     assert [file.name for file in other.iterdir()] == ["metrics.json"]
     rebuild(rehearsed, rehearsed / "../rehearsal")  # the same one by another name
+
+
+def test_a_folder_that_cannot_be_made_is_named(rehearsed, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ResultFolderError, match="file cannot be written: file exists"):
+        rebuild(rehearsed, tmp_path / "file")

@@ -19,6 +19,7 @@ from uam_lab.records.results.result_folder import (
     ResultFolder,
     ResultFolderError,
     known_json,
+    make_folder,
 )
 
 CUT_OFF = "the log ends before the mission was over"
@@ -56,7 +57,7 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     outcome.notes = list(dict.fromkeys([*earlier, *outcome.notes]))
     if not outcome.done:
         outcome.failure = before.get("abort_reason") or CUT_OFF
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out, shared=True)
     for name in FILES:
         _take_over(name, directory, out, facts.texts)
     return complete(folder, known, outcome)
@@ -68,7 +69,7 @@ def copy_flight(directory: Path, out: Path) -> None:
     Raises ResultFolderError if `out` contains a flight; OSError.
     """
     ResultFolder(out).refuse_flight()
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out, shared=True)
     for name in (TABLE, "metrics.json", "info.json", *FILES):
         if (directory / name).exists():
             copy(directory / name, out / name)
