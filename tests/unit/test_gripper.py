@@ -17,6 +17,7 @@ from uam_control.grasp.windows import Approach
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.motion.trajectory import Move
 from uam_control.mission.scenarios.scenario import standing
+from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import (
     OpenEnd,
@@ -74,7 +75,12 @@ def test_the_mission_knows_the_grippers_numbers():
         ("derives: s500_arm\ngripper: none\n", "gripper: none, but the vehicle has a magnet, too"),
         ("derives: s500_gripper\ngripper: {opening: [0.05, 0.02]}\n", "[0.05, 0.02]: closed"),
         ("derives: s500_gripper\ngripper: {force: 0}\n", "gripper.force: 0 is not above 0"),
-        ("derives: s500_gripper\ngripper: {type: pincers}\n", "unknown gripper 'pincers'"),
+        ("derives: s500_gripper\ngripper: {type: pincers}\n",
+         "unknown gripper 'pincers'; there are: two_finger, or"),
+        ("derives: s500arm\n", "own.yaml: unknown vehicle 's500arm'"),
+        ("derives: s500_arm\nprofiles: {modular: s501}\n", "own.yaml: unknown profile 's501'"),
+        ("derives: s500_arm\nautopilot: s501\n", "own.yaml: unknown autopilot 's501'"),
+        ("derives: s500_arm\nprofiles: {modulr: s500}\n", "own.yaml: profiles.modulr: unknown"),
         ("derives: s500_gripper\nmas: 2.0\n", "mas"),
     ],
 )  # fmt: skip
@@ -85,7 +91,7 @@ def test_a_derived_file_is_checked_as_a_whole(tmp_path, text, reason):
         assert load_description(file).rotors == S500.rotors
         return
     with pytest.raises(ValueError) as refused:
-        load_description(file)
+        default_profile("modular", load_description(file))
     assert reason in str(refused.value) and "\n" not in str(refused.value)
 
 

@@ -260,6 +260,11 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
     vehicle = vehicle or load_description()
     if not vehicle.profile(catalogue.DEFAULT):
         raise ProfileError(f"{vehicle.file}: no profile: uam vehicle design {vehicle.source}")
+    for named in vehicle.profiles:
+        if named not in catalogue.LAWS:
+            raise ProfileError(
+                f"{vehicle.file}: profiles.{named}: {unknown(named, catalogue.LAWS)}"
+            )
     if complete := complete_profile(law, vehicle):
         return load_profile(complete, vehicle=vehicle)
     sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)

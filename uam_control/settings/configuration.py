@@ -73,14 +73,17 @@ def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
 def beside(file: Path, folder: str, name: str) -> str:
     """Return the name of config/<folder>, or file relative to the folder of `file`, in `file`.
 
-    Raises ConfigurationError for a file that does not exist there.
+    Raises ConfigurationError, with `file`, for a name or a file that does not exist.
     """
     near = file.parent / Path(name).expanduser()
-    if near.is_file() or near.suffix.lower() in SUFFIXES or len(Path(name).parts) > 1:
-        return str(named(folder, str(near.absolute())))
-    return name
+    own = near.is_file() or near.suffix.lower() in SUFFIXES or len(Path(name).parts) > 1
+    try:
+        found = named(folder, str(near.absolute()) if own else name)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{file}: {error}") from None
+    return str(found) if own else name
 
 
 def names(folder: str, suffixes: tuple[str, ...] = SUFFIXES) -> list[str]:
     """Return the names that `named` accepts for config/<folder>, sorted."""
-    return sorted(p.stem for p in (root() / folder).glob("*") if p.suffix in suffixes)
+    return sorted({p.stem for p in (root() / folder).glob("*") if p.suffix in suffixes})
