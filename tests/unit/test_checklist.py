@@ -27,7 +27,7 @@ from uam_lab.preflight.checklist.observation import (
     Stream,
     StreamReport,
 )
-from uam_lab.preflight.checklist.step import CONFIRM, Finding, Situation, StepState
+from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message, read_items
 from uam_msgs_py.messages.status import ChecklistState, RadioState
 
@@ -220,8 +220,11 @@ def test_frames_on_the_ticks_of_a_simulation_are_not_lost(seed, lost):
     assert stream.report(2.0).loss == pytest.approx(lost / 240, abs=5e-4)
 
 
-PASSING = (Finding("battery", "90 %", "at least 60 %", True), Finding("level", "0", "", True, True))
-FAILING = (replace(PASSING[0], passed=False), PASSING[1])
+PASSING = (
+    PreflightCheck("battery", "90 %", "at least 60 %", True),
+    PreflightCheck("level", "0", "", True, True),
+)
+FAILING = (PASSING[0]._replace(passed=False), PASSING[1])
 
 
 def confirmed_steps():
@@ -238,7 +241,7 @@ def test_the_order_of_the_list_and_the_permission():
     )  # fmt: skip
     checklist.update(Situation(2.0), PASSING, armed=False)
     assert checklist.step.name == "hands_on"
-    tilted = (PASSING[0], replace(PASSING[1], passed=False))
+    tilted = (PASSING[0], PASSING[1]._replace(passed=False))
     checklist.update(Situation(3.0), tilted, armed=False)  # in the hands: not judged
     assert checklist.findings == PASSING
     assert checklist.confirm() == (True, "hands_on confirmed")

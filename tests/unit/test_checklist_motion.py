@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector
+from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.checklist import Checklist
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.motion_step import MotionStep
 from uam_lab.preflight.checklist.observation import Window
-from uam_lab.preflight.checklist.step import Finding, Situation, StepState
+from uam_lab.preflight.checklist.step import Situation, StepState
 
 LIMITS = ChecklistParameters()
 JOINTS = ("alpha_1", "alpha_2")
@@ -209,7 +210,7 @@ def test_without_samples_nothing_happens():
 def test_the_whole_list_with_a_person():
     """All motions one after the other, with the checklist's own order and confirmations."""
     vehicle, checklist = HeldVehicle(noise=1.0), Checklist(guided(JOINTS, LIMITS))
-    fine = (Finding("battery", "90 %", "", True),)
+    fine = (PreflightCheck("battery", "90 %", "", True),)
 
     def update(killed=False):
         sample = vehicle.sample()

@@ -16,12 +16,16 @@ UNKNOWN = "unknown"
 
 
 class PreflightCheck(NamedTuple):
-    """One line of the report; value and limit with their units."""
+    """One line of a report; value and limit with their units.
+
+    standing: of the checklist, judged only while nobody moves the vehicle.
+    """
 
     name: str
     value: str
     limit: str
     passed: bool
+    standing: bool = False
 
     @property
     def text(self) -> str:

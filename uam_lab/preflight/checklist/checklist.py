@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.limits import ChecklistParameters
-from uam_lab.preflight.checklist.step import Finding, Situation, Step, StepState
+from uam_lab.preflight.checklist.step import Situation, Step, StepState
 
 AUTOMATIC, GUIDED = "automatic", "guided"
 
@@ -36,7 +37,7 @@ class Checklist:
 
     def __init__(self, steps: Sequence[Step]) -> None:
         self.steps = list(steps)
-        self.findings: tuple[Finding, ...] = ()
+        self.findings: tuple[PreflightCheck, ...] = ()
         self.entries: list[Entry] = []
         self._time = 0.0
         self._armed = False
@@ -61,7 +62,7 @@ class Checklist:
         """Return whether every item has passed."""
         return not self.failing_names
 
-    def update(self, now: Situation, findings: Iterable[Finding], armed: bool) -> None:
+    def update(self, now: Situation, findings: Iterable[PreflightCheck], armed: bool) -> None:
         """Judge what is seen at `now`; findings: of the automatic items."""
         self._time, self._armed = now.time, armed
         if armed:
@@ -76,7 +77,7 @@ class Checklist:
             if step.state is StepState.PASSED:
                 self._begin_next(now.time)
 
-    def _take(self, findings: tuple[Finding, ...]) -> None:
+    def _take(self, findings: tuple[PreflightCheck, ...]) -> None:
         if self.step is not None:  # the vehicle is in the hands of a person
             before = {one.name: one for one in self.findings}
             findings = tuple(before.get(one.name, one) if one.standing else one for one in findings)
@@ -133,7 +134,7 @@ class Checklist:
     def _note(
         self,
         kind: str,
-        finding: Finding,
+        finding: PreflightCheck,
         state: StepState,
         confirmed: bool = False,
         tries: int = 0,

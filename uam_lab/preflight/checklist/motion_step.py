@@ -7,13 +7,12 @@ wrong direction fails as soon as it is kept.
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
-from typing import Self
 
 import numpy as np
 
 from uam_control.maths.rotations import matrix_from_quaternion
+from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.limits import MotionLimits
 from uam_lab.preflight.checklist.observation import (
     Sample,
@@ -22,54 +21,33 @@ from uam_lab.preflight.checklist.observation import (
     rotation_vector,
     up,
 )
-from uam_lab.preflight.checklist.step import MOTION, Finding, Situation, Step, StepState
+from uam_lab.preflight.checklist.step import MOTION, Situation, Step, StepState
 
 AXES = ("roll", "pitch", "yaw")
 DIRECTIONS = ("forward", "left", "up")
 
 
-@dataclass(frozen=True)
-class Pose:
-    """Means of some samples at `time` [s]; entries as in `Sample`."""
-
-    time: float
-    position: np.ndarray
-    attitude: np.ndarray
-    gyro: np.ndarray
-    force: np.ndarray
-    joints: np.ndarray
-    commanded: np.ndarray
-
-    @classmethod
-    def of(cls, samples: Sequence[Sample]) -> Self:
-        """Return the means of at least one sample; attitudes: of the middle sample."""
-        middle = samples[len(samples) // 2]
-
-        def mean(name: str) -> np.ndarray:
-            return np.mean([getattr(one, name) for one in samples], axis=0)
-
-        return cls(
-            middle.time,
-            mean("position"),
-            middle.attitude,
-            middle.gyro,
-            mean("force"),
-            mean("joints"),
-            np.median([one.commanded for one in samples], axis=0),
-        )
-
-
 class Kind:
-    """What a motion is measured by. labels: of its components; unit: of all of them."""
+    """What a motion is measured by. labels: of its components; unit: of all of them; axis: index
+    of the tested one; still: their largest change while a pose is kept.
+
+    commands, arm_released: see `Step`.
+    """
 
     labels: tuple[str, ...]
-    unit: str
+    unit = "rad"
+    commands = arm_released = False
 
-    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
+    def __init__(self, axis: int, limits: MotionLimits) -> None:
+        self.axis, self.limits, self.still = axis, limits, limits.still_angle
+
+    def components(self, begin: Sample, now: Sample) -> np.ndarray:
         """Return the components (n,) of the motion since `begin`."""
         raise NotImplementedError
 
-    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
+    def checks(
+        self, begin: Sample, left: Sample, kept: Sample, sign: int
+    ) -> Iterator[PreflightCheck]:
         """Yield whether other sensors agree; nothing where no other one measures the motion."""
         yield from ()
 
@@ -77,22 +55,22 @@ class Kind:
 class Turn(Kind):
     """A turn of the vehicle about its axes, by motion capture; checked by IMU and commands."""
 
-    labels, unit = AXES, "rad"
+    labels = AXES
+    commands = True  # the laws command body rates against it
 
-    def __init__(self, axis: int, limits: MotionLimits) -> None:
-        self._axis, self._limits = axis, limits
-
-    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
+    def components(self, begin: Sample, now: Sample) -> np.ndarray:
         """Return the turn (3,) [rad] about roll, pitch and yaw axis since `begin`."""
         return rotation_vector(begin.attitude, now.attitude)
 
-    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
+    def checks(
+        self, begin: Sample, left: Sample, kept: Sample, sign: int
+    ) -> Iterator[PreflightCheck]:
         """Yield whether accelerometer, gyroscope and commands agree about the turn.
 
         left: the sample at which the pose before was left. The gyroscope is integrated from there,
         so that its bias does not add up while nothing moves.
         """
-        limits, axis = self._limits, self._axis
+        limits, axis = self.limits, self.axis
         size = abs(float(self.components(begin, kept)[axis]))
         if axis < 2:
             before, after = (one / np.linalg.norm(one) for one in (begin.force, kept.force))
@@ -103,17 +81,19 @@ class Turn(Kind):
         yield self._agreement("gyro", turned, turn, float(np.linalg.norm(turn)))
         against = -sign * kept.commanded[axis]
         others = float(np.max(np.abs(np.delete(kept.commanded, axis))))
-        yield Finding(
+        yield PreflightCheck(
             "commanded rate",
             f"{-against * sign:+.2f} rad/s, others up to {others:.2f}",
             f"at least {limits.rate_response:.3g} rad/s against the turn, others less",
             against >= limits.rate_response and others < against,
         )
 
-    def _agreement(self, name: str, seen: np.ndarray, mocap: np.ndarray, size: float) -> Finding:
-        limit = self._limits.agreement * size
+    def _agreement(
+        self, name: str, seen: np.ndarray, mocap: np.ndarray, size: float
+    ) -> PreflightCheck:
+        limit = self.limits.agreement * size
         off = float(np.linalg.norm(seen - mocap))
-        return Finding(
+        return PreflightCheck(
             f"{name} against mocap", f"{off:.3f} rad", f"at most {limit:.3f} rad", off <= limit
         )
 
@@ -123,7 +103,11 @@ class Shift(Kind):
 
     labels, unit = DIRECTIONS, "m"
 
-    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
+    def __init__(self, axis: int, limits: MotionLimits) -> None:
+        super().__init__(axis, limits)
+        self.still = limits.still_position
+
+    def components(self, begin: Sample, now: Sample) -> np.ndarray:
         """Return the displacement (3,) [m] forward, left and up since `begin`."""
         nose = matrix_from_quaternion(begin.attitude)[:, 0]
         nose = np.array([nose[0], nose[1], 0.0]) / np.hypot(nose[0], nose[1])
@@ -132,14 +116,15 @@ class Shift(Kind):
 
 
 class JointTurn(Kind):
-    """A turn of a joint."""
+    """A turn of a joint, whose servo has no torque meanwhile."""
 
-    unit = "rad"
+    arm_released = True
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, axis: int, limits: MotionLimits, names: Sequence[str]) -> None:
+        super().__init__(axis, limits)
         self.labels = tuple(names)
 
-    def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray:
+    def components(self, begin: Sample, now: Sample) -> np.ndarray:
         """Return the turns (n,) [rad] of all joints since `begin`."""
         return now.joints - begin.joints
 
@@ -162,15 +147,13 @@ class MotionStep(Step):
         self,
         name: str,
         kind: Kind,
-        axis: int,
-        targets: Sequence[tuple[int, str]],
+        instructions: Sequence[str],
         amplitude: float,
-        still: float,
-        limits: MotionLimits,
         back: str = "Bring it back.",
     ) -> None:
-        """axis: index of the tested component; targets: signs and instructions; amplitude: least
-        motion; still: largest change while it is kept, both in the unit of `kind`."""
+        """instructions: of the targets, the first along the axis, the second against it; amplitude:
+        least motion, in the unit of `kind`."""
+        limits, axis = kind.limits, kind.axis
         others = limits.other_axes
         super().__init__(
             name,
@@ -179,11 +162,14 @@ class MotionStep(Step):
             f"others at most {others:.3g} of it, all sensors agree",
             MOTION,
         )
-        self._kind, self._axis, self._targets = kind, axis, list(targets)
-        self._amplitude, self._still, self._limits, self._back = amplitude, still, limits, back
+        self.commands, self.arm_released = kind.commands, kind.arm_released
+        self._kind, self._axis = kind, axis
+        self._targets = list(zip((1, -1), instructions, strict=False))
+        self._amplitude, self._still, self._limits = amplitude, kind.still, limits
+        self._back = back
         self._window = Window(2.0 * max(limits.hold_time, limits.rest_time))
         self._stage, self._next = Stage.REST, 0
-        self._begin: Pose | None = None
+        self._begin: Sample | None = None
         self._from: np.ndarray | None = None  # components when the target became the next one
         self._left: Sample | None = None  # newest sample that is still there
         self._since: float | None = None
@@ -230,7 +216,7 @@ class MotionStep(Step):
         samples = self._window.last(self._limits.rest_time)
         if not samples:
             return
-        pose = Pose.of(samples)
+        pose = Sample.mean(samples)
         tilt = max(angle_between(up(pose.attitude), _UPWARD), angle_between(pose.force, _UPWARD))
         unrest = _unrest(pose, samples, self._limits)
         self.seen = unrest or f"tilted by {tilt:.2f} rad, at most {self._limits.upright:.2f}"
@@ -249,13 +235,13 @@ class MotionStep(Step):
         samples, path = self._followed(moved)
         if not samples or np.max(np.ptp(path, axis=0)) > self._still:
             return
-        kept = self._kind.components(begin, Pose.of(samples))
+        kept = self._kind.components(begin, Sample.mean(samples))
         if np.max(np.abs(kept)) < self._amplitude:
             return
         if np.max(np.abs(kept - self._from)) < LEFT_BEHIND * self._amplitude:
             return
         sign = self._targets[self._next][0]
-        pose = Pose.of(samples)
+        pose = Sample.mean(samples)
         found = [self._direction(kept, sign), *self._kind.checks(begin, self._left, pose, sign)]
         failed = [one for one in found if not one.passed]
         if failed:
@@ -281,7 +267,7 @@ class MotionStep(Step):
             self._path.popleft()
         return samples, np.array(self._path)
 
-    def _direction(self, kept: np.ndarray, sign: int) -> Finding:
+    def _direction(self, kept: np.ndarray, sign: int) -> PreflightCheck:
         """Return whether the tested axis has moved, in the asked direction, and no other."""
         axis, labels, unit = self._axis, self._kind.labels, self._kind.unit
         size = np.abs(kept)
@@ -298,7 +284,7 @@ class MotionStep(Step):
         )
         limit = f"{asked}, at least {self._amplitude:.3g} {unit}, others at most "
         limit += f"{self._limits.other_axes:.3g} of it"
-        return Finding("motion", value, limit, bool(passed))
+        return PreflightCheck("motion", value, limit, bool(passed))
 
     def _come_home(self, now: Situation) -> None:
         moved = self._kind.components(self._begin, now.sample)
@@ -320,7 +306,7 @@ class MotionStep(Step):
         return ", ".join(f"{label} {value:+.2f}" for label, value in pairs) + f" {self._kind.unit}"
 
 
-def _unrest(pose: Pose, samples: Sequence[Sample], limits: MotionLimits) -> str:
+def _unrest(pose: Sample, samples: Sequence[Sample], limits: MotionLimits) -> str:
     """Return what is not at rest in the samples, "" if everything is."""
     places = np.ptp([one.position for one in samples], axis=0)
     turns = [np.linalg.norm(rotation_vector(pose.attitude, one.attitude)) for one in samples]

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple, Self
 
@@ -42,6 +42,17 @@ class Sample:
     rate: np.ndarray
     joints: np.ndarray
     commanded: np.ndarray
+
+    @classmethod
+    def mean(cls, samples: Sequence[Self]) -> Self:
+        """Return the means of at least one sample; the attitudes, and the time, of the middle one,
+        the medians of `commanded`."""
+        means = {
+            name: np.mean([getattr(one, name) for one in samples], axis=0)
+            for name in ("position", "force", "rate", "joints")
+        }
+        commanded = np.median([one.commanded for one in samples], axis=0)
+        return replace(samples[len(samples) // 2], commanded=commanded, **means)
 
 
 class GyroIntegral:
@@ -218,17 +229,15 @@ class Resting:
     def of(cls, samples: Sequence[Sample]) -> Self:
         """Return the means of at least one sample."""
         vertical = np.mean([up(one.attitude) for one in samples], axis=0)
-        force = np.mean([one.force for one in samples], axis=0)
-        positions = np.array([one.position for one in samples])
-        rate = np.mean([one.rate for one in samples], axis=0)
+        mean = Sample.mean(samples)
         return cls(
-            positions.mean(axis=0),
-            np.mean([one.joints for one in samples], axis=0),
+            mean.position,
+            mean.joints,
             angle_between(vertical, np.array([0.0, 0.0, 1.0])),
-            angle_between(vertical, force),
-            float(np.linalg.norm(force)),
-            float(np.max(np.abs(rate))),
-            float(np.max(np.ptp(positions, axis=0))),
+            angle_between(vertical, mean.force),
+            float(np.linalg.norm(mean.force)),
+            float(np.max(np.abs(mean.rate))),
+            float(np.max(np.ptp([one.position for one in samples], axis=0))),
         )
 
 

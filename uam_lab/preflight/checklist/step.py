@@ -3,43 +3,27 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.observation import Sample
 
 MOTION, CONFIRM = "motion", "confirm"  # what a step needs
 UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True)
-class Finding:
-    """name: of the item; value and limit: texts with units.
-
-    standing: the item is judged only while nobody moves the vehicle.
-    """
-
-    name: str
-    value: str
-    limit: str
-    passed: bool
-    standing: bool = False
-
-    @property
-    def text(self) -> str:
-        """Return the finding in one line."""
-        return f"{self.name}: {self.value} ({self.limit})"
-
-
 def at_most(
     name: str, value: float | None, limit: float, unit: str, standing: bool = False
-) -> Finding:
-    """Return the finding of a value with an upper limit; None: it is not known, not passed."""
+) -> PreflightCheck:
+    """Return the check of a value with an upper limit; None: it is not known, not passed."""
     passed = value is not None and value <= limit
-    return Finding(name, _shown(value, unit), f"at most {_shown(limit, unit)}", passed, standing)
+    return PreflightCheck(
+        name, _shown(value, unit), f"at most {_shown(limit, unit)}", passed, standing
+    )
 
 
-def at_least(name: str, value: float | None, limit: float, unit: str) -> Finding:
-    """Return the finding of a value with a lower limit; None: it is not known, not passed."""
+def at_least(name: str, value: float | None, limit: float, unit: str) -> PreflightCheck:
+    """Return the check of a value with a lower limit; None: it is not known, not passed."""
     passed = value is not None and value >= limit
-    return Finding(name, _shown(value, unit), f"at least {_shown(limit, unit)}", passed)
+    return PreflightCheck(name, _shown(value, unit), f"at least {_shown(limit, unit)}", passed)
 
 
 def _shown(value: float | None, unit: str) -> str:
@@ -93,9 +77,11 @@ class Step:
         return self._instruction
 
     @property
-    def finding(self) -> Finding:
+    def finding(self) -> PreflightCheck:
         """Return the result."""
-        return Finding(self.name, self.value or "open", self.limit, self.state is StepState.PASSED)
+        return PreflightCheck(
+            self.name, self.value or "open", self.limit, self.state is StepState.PASSED
+        )
 
     def begin(self, time: float) -> None:
         """Begin the step, or begin it again, at `time` [s]."""
