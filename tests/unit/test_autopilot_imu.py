@@ -6,8 +6,14 @@ import pytest
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.telemetry import Telemetry
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
-from uam_sim_bridge.mavlink.telemetry.autopilot_imu import FRESH, SLEW, AutopilotImu, ClockMap
-from uam_sim_bridge.mavlink.telemetry.time_sync import TimeSync, nanoseconds
+from uam_sim_bridge.mavlink.telemetry.time_sync import (
+    FRESH,
+    SLEW,
+    AutopilotImu,
+    ClockMap,
+    TimeSync,
+    nanoseconds,
+)
 
 BOOT = 1_700_000_000.25  # [s] companion's clock when the autopilot's began
 NUMBER = mavlink2.MAVLINK_MSG_ID_HIGHRES_IMU

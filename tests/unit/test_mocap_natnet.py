@@ -384,7 +384,7 @@ def test_the_process_of_the_library_prints_one_line_per_frame():
             "interface_ip": "127.0.0.1",
             "port_command": str(server.port),
         }
-        command = [sys.executable, "-m", "uam_sim_bridge.devices.mocap.library_process"]
+        command = [sys.executable, "-m", "uam_sim_bridge.devices.mocap.library_source"]
         process = subprocess.Popen(
             [*command, "optitrack", json.dumps(options)], stdout=subprocess.PIPE, env=os.environ
         )

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from effects_rig import flown, plant
 
-from uam_sim_bridge.mavlink.transport.faulty_transport import LateTransport
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.arm_occlusion import distance, hide, seen_markers, shift_pose
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
@@ -160,7 +161,7 @@ class Wire:
 
 def test_messages_arrive_after_the_delay_and_in_order():
     wire = Wire()
-    late = LateTransport(wire, SetpointDelay(0.006, 0.0, 0.0, 1))
+    late = FaultyTransport(wire, Schedule(), SetpointDelay(0.006, 0.0, 0.0, 1))
     for tick in range(5):
         late.update(0.004 * tick)
         assert late.send(bytes([tick]))
@@ -169,7 +170,7 @@ def test_messages_arrive_after_the_delay_and_in_order():
 
 def test_a_message_without_delay_is_sent_at_once_unless_another_waits():
     wire = Wire()
-    late = LateTransport(wire, SetpointDelay(0.0, 0.0, 0.0, 1))
+    late = FaultyTransport(wire, Schedule(), SetpointDelay(0.0, 0.0, 0.0, 1))
     late.update(0.0)
     late.send(b"a")
     assert wire.sent == [b"a"]

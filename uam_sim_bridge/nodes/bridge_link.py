@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnet, AutopilotMagnetParameters
 from uam_control.offboard.firmware import Firmware
@@ -18,7 +17,6 @@ from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, Requir
 from uam_sim_bridge.mavlink.transport.faulty_transport import (
     FaultyTransport,
     GroundStation,
-    LateTransport,
 )
 from uam_sim_bridge.mavlink.transport.transport import (
     Transport,
@@ -34,25 +32,14 @@ EXIT_TIME = 1.0  # [s] for the acknowledgement at the node's end
 EXIT_STEP = 0.02  # [s] between two looks for it
 
 
-@dataclass(frozen=True)
-class Links:
-    """The open links; station, faulty, late: None if not configured. waits: for a device."""
-
-    autopilot: OffboardLink
-    station: GroundStation | None
-    faulty: FaultyTransport | None
-    late: LateTransport | None
-    waits: bool
-
-
 def open_links(
     options: BridgeParameters,
     sequence: OffboardSequence,
     mapping: RateThrustParameters,
     imu_rate: float = 0.0,
     clock: Callable[[], float] | None = None,
-) -> Links:
-    """Open the links; imu_rate, clock: see OffboardLink.
+) -> tuple[OffboardLink, GroundStation | None, FaultyTransport | None]:
+    """Open and return the links, None if not configured; imu_rate, clock: see OffboardLink.
 
     Raises PortError, ParameterError, FaultError in one line.
     """
@@ -63,24 +50,21 @@ def open_links(
     faults = Schedule.from_text(options.faults).only(LINK)
     delay = SetpointDelay.from_text(options.network_delay)
     transport: Transport
-    waits = options.wait_for_device
     if url:
-        transport = open_transport(url, absent=waits)
+        transport = open_transport(url, absent=options.wait_for_device)
     else:
         transport = UdpTransport(
             options.local_port, (options.autopilot_host, options.autopilot_port)
         )
-    faulty = station = late = None
-    if delay is not None:
-        transport = late = LateTransport(transport, delay)
-    if faults:
-        transport = faulty = FaultyTransport(transport, faults)
+    faulty = station = None
+    if faults or delay is not None:
+        transport = faulty = FaultyTransport(transport, faults, delay)
     if options.gcs:
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(options.gcs, transport, codec)
     link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock, required)
     link.parameters.writing = options.set_parameters
-    return Links(link, station, faulty, late, waits)
+    return link, station, faulty
 
 
 def _required(given: str, url: str, spoken: Firmware) -> RequiredParameters | None:

@@ -84,9 +84,9 @@ class MavlinkBridgeNode(UamNode):
             own_imu = 1.0 / vehicle.control_period, clock.now
             self.wake_up = IMU_WAKE_UP
         links = open_links(options, sequence, mapping.current, *own_imu)
-        self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
-        self._late = links.late
-        self._early = links.waits and not own_imu  # the link is served before the first tick
+        self.link, self._station, self._faulty = links
+        # whether the link is served before the first tick
+        self._early = options.wait_for_device and not own_imu
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
         self.stage = BridgeStage(
@@ -96,7 +96,7 @@ class MavlinkBridgeNode(UamNode):
         if own_imu:
             self._imu = AutopilotImuTopic(self, self.link, clock)
         self._magnet = bridge_magnet(self, self.link)
-        self._fault_topic = FaultTopic(self) if self._faulty else None
+        self._fault_topic = FaultTopic(self) if options.faults else None
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
         self._last_tick = time.monotonic()
@@ -227,10 +227,9 @@ class MavlinkBridgeNode(UamNode):
         return late
 
     def _begin_link(self, stamp: int) -> None:
-        if self._late:
-            self._late.update(stamp / SECOND)
-        if self._faulty and self._fault_topic:
-            self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
+        changed = self._faulty.update(stamp / SECOND) if self._faulty else ()
+        if self._fault_topic:
+            self._fault_topic.publish(stamp, changed)
         self._adopt()
         if self._magnet is not None:
             self._magnet.update(stamp / SECOND)

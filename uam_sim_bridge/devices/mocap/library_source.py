@@ -6,6 +6,7 @@ vendor's code must not end the driver. The library gives neither stamps nor numb
 
 import importlib.util
 import json
+import os
 import select
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import numpy as np
 from uam_sim_bridge.devices import INSTALL
 from uam_sim_bridge.devices.mocap.frame import BodyPose, Frame, MocapError
 
-PROGRAM = "uam_sim_bridge.devices.mocap.library_process"
+PROGRAM = "uam_sim_bridge.devices.mocap.library_source"
 SYSTEMS = (
     "vicon",
     "qualisys",
@@ -121,3 +122,35 @@ def _pose(x: float, y: float, z: float, qw: float, qx: float, qy: float, qz: flo
 def _last_line(text: bytes) -> str:
     lines = text.decode(errors="replace").strip().splitlines()
     return lines[-1] if lines else "ended without a word"
+
+
+def main() -> int:
+    """Print one line of JSON per frame until the output is closed; return the exit status.
+
+    [arrival in ns, {"body": [x, y, z, qw, qx, qy, qz], ...}]; arguments: kind of system, its
+    options in JSON.
+    """
+    import motioncapture
+
+    system, options = sys.argv[1:3]
+    # the library prints on standard output itself
+    lines = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1, encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    try:
+        connection = motioncapture.connect(system, json.loads(options))
+        while True:
+            connection.waitForNextFrame()
+            arrival = time.time_ns()
+            bodies = {
+                name: [*map(float, body.position), q.w, q.x, q.y, q.z]
+                for name, body in connection.rigidBodies.items()
+                for q in [body.rotation]
+            }
+            print(json.dumps([arrival, bodies]), file=lines)
+    except (RuntimeError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

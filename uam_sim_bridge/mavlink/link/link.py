@@ -25,15 +25,19 @@ from uam_sim_bridge.mavlink.protocol.wire import (
     TextAssembler,
     mavlink2,
 )
-from uam_sim_bridge.mavlink.telemetry.autopilot_imu import NUMBER as HIGHRES_IMU
-from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
 from uam_sim_bridge.mavlink.telemetry.parameter_check import request as parameter_request
 from uam_sim_bridge.mavlink.telemetry.parameter_check import setting as parameter_setting
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.mavlink.telemetry.streams import LinkStatistics, StreamCheck
-from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
+from uam_sim_bridge.mavlink.telemetry.time_sync import (
+    HIGHRES_IMU,
+    AutopilotImu,
+    RebootDetector,
+    TimeSync,
+    nanoseconds,
+)
 from uam_sim_bridge.mavlink.telemetry.vitals import ESTIMATOR_FLAGS, Vitals, estimate_faults, names
 from uam_sim_bridge.mavlink.transport.transport import Transport
 

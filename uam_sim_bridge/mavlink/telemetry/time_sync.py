@@ -1,13 +1,24 @@
-"""Clock offset, round trip and restarts of the autopilot, from TIMESYNC; the companion's side.
+"""The autopilot's clock, from TIMESYNC, and its IMU as a sensor with stamps of the companion.
+
+Clock offset, round trip and restarts; the companion's side.
 
 A request carries the companion's time; the answer repeats it and adds the autopilot's time. The
 autopilot is assumed to read its clock at the middle of the round trip, so the error is at most half
 of it: short round trips get a higher weight. Times are those of the companion's clock; where that
 is the clock of the ticks, round trips have a resolution of one tick.
+
+HIGHRES_IMU → samples in FLU. PX4 v1.16 sends the selected IMU, integrated over IMU_INTEG_RATE
+(200 Hz by default) and without the estimated biases; time_usec is the sample's time since boot.
 """
 
 import math
 from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.frames import swap_body
+from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
 PERIOD = 0.2  # s between two requests
 JUMP = 0.1  # s of offset error beyond half the round trips: one of the clocks has jumped
@@ -19,6 +30,10 @@ _SHORTEST = 1e-3  # s, lower bound of a round trip in the weights
 _NEWEST = 5  # answers of one second
 BACKWARDS = 1.0  # s: a smaller step back may be messages out of order
 BEHIND = 5  # messages in a row that show a reboot
+HIGHRES_IMU = mavlink2.MAVLINK_MSG_ID_HIGHRES_IMU
+SLEW = 50_000  # [ns] per sample: 1 % of the time at 250 Hz
+FRESH = 0x3F  # fields_updated: accelerometer and gyroscope
+STORED = 32  # newest samples
 _WRAP = 2**32 * 1e-3  # s, period of a 32-bit time in milliseconds: 49.7 days
 
 
@@ -133,3 +148,69 @@ class RebootDetector:
         self._behind.clear()
         self._latest = time
         return latest - time < _WRAP - 60.0
+
+
+class ClockMap:
+    """Follows the offset of `TimeSync` by at most SLEW per sample.
+
+    The first answers over a slow link may be wrong by many milliseconds. A better one must not let
+    the stamps go back.
+    """
+
+    def __init__(self, sync: TimeSync) -> None:
+        self._sync = sync
+        self._offset: int | None = None  # [ns] autopilot's clock - companion's clock
+
+    def companion(self, stamp: int) -> int | None:
+        """Return the stamp [ns] of a sample in the companion's clock; stamp: the autopilot's [ns].
+
+        None before five answers, and after a reboot until there are five again.
+        """
+        sync = self._sync
+        if sync.offset is None or sync.quickest is None:
+            self._offset = None
+            return None
+        measured = round(sync.offset * 1e9)
+        if self._offset is None:
+            self._offset = measured
+        self._offset += max(-SLEW, min(SLEW, measured - self._offset))
+        return stamp - self._offset
+
+
+class ImuSample(NamedTuple):
+    """stamp [ns] of the companion's clock; gyro (3,) [rad/s], force (3,) [m/s^2], FLU."""
+
+    stamp: int
+    gyro: np.ndarray
+    force: np.ndarray
+
+
+class AutopilotImu:
+    """Samples of the autopilot's IMU; `refused`: those that cannot be used.
+
+    Nothing is delivered before the clocks are related, nor after a reboot until they are again.
+    """
+
+    def __init__(self, sync: TimeSync) -> None:
+        """sync: relates the two clocks, see `ClockMap`."""
+        self._clocks = ClockMap(sync)
+        self._samples: deque[ImuSample] = deque(maxlen=STORED)
+        self.refused = 0
+
+    def take(self, m: Message) -> None:
+        """Store the sample of a HIGHRES_IMU."""
+        gyro = np.array([m.xgyro, m.ygyro, m.zgyro])
+        force = np.array([m.xacc, m.yacc, m.zacc])
+        fresh = m.fields_updated & FRESH == FRESH and m.id == 0
+        if not fresh or not math.isfinite(gyro.sum() + force.sum()):
+            self.refused += 1
+            return
+        stamp = self._clocks.companion(1000 * m.time_usec)
+        if stamp is not None:
+            self._samples.append(ImuSample(stamp, swap_body(gyro), swap_body(force)))
+
+    def samples(self) -> list[ImuSample]:
+        """Remove and return the stored samples, in order."""
+        found = list(self._samples)
+        self._samples.clear()
+        return found

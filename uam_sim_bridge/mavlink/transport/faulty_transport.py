@@ -1,4 +1,4 @@
-"""Transports around another one: late, with faults of the link, or with a ground station beside.
+"""Transports around another one: late and with faults of the link, or a ground station beside.
 
 `GroundStation` wraps the autopilot's transport for `OffboardLink`. It forwards the autopilot's
 bytes unchanged to the station. From the station it forwards only whole valid messages, with a
@@ -37,73 +37,44 @@ class WrappedTransport:
         return getattr(self.inner, name)
 
 
-class WaitingTransport(WrappedTransport):
-    """Base of transports that send packets to the autopilot later, in order.
-
-    It has no clock: `update` passes the time. `send` returns True also for a packet that waits.
-    """
-
-    def __init__(self, inner: Transport) -> None:
-        """inner: wrapped transport, closed together with this one."""
-        super().__init__(inner)
-        self._now = 0.0
-        self._outgoing: deque[tuple[float, bytes]] = deque()
-
-    def update(self, stamp: float) -> Any:
-        """Set the time to `stamp` [s], send the packets that are due."""
-        self._now = max(self._now, stamp)
-        for data in self._due(self._outgoing):
-            self.inner.send(data)
-
-    def _send(self, data: bytes, late: float) -> bool:
-        if not late and not self._outgoing:
-            return self.inner.send(data)
-        self._outgoing.append((self._now + late, data))
-        return True
-
-    def _due(self, queue: deque[tuple[float, bytes]]) -> list[bytes]:
-        """Remove and return the packets that are due, in order: no packet overtakes another."""
-        found = []
-        while queue and queue[0][0] <= self._now + 1e-9:
-            found.append(queue.popleft()[1])
-        return found
-
-
-class LateTransport(WaitingTransport):
-    """Wraps a transport; packets to the autopilot are sent after the delay of their tick."""
-
-    def __init__(self, inner: Transport, delay: SetpointDelay) -> None:
-        super().__init__(inner)
-        self._delay = delay
-
-    def send(self, data: bytes) -> bool:
-        """Send to the autopilot when the packet is due."""
-        return self._send(data, self._delay.at(self._now))
-
-
-class FaultyTransport(WaitingTransport):
+class FaultyTransport(WrappedTransport):
     """Wraps a transport; loses, delays and corrupts packets at the times of a schedule.
 
-    `timeline`: their times, which need that of the mission. `send` returns True also for a packet
-    that a fault loses: a real sender does not detect the loss.
+    It has no clock: `update` passes the time. `timeline`: of the faults, needs that of the mission.
+    `send` returns True also for a packet that waits, or that a fault loses: a real sender does not
+    detect the loss.
     """
 
-    def __init__(self, inner: Transport, schedule: Schedule) -> None:
-        """schedule: link faults only."""
+    def __init__(
+        self, inner: Transport, schedule: Schedule, network: SetpointDelay | None = None
+    ) -> None:
+        """inner: wrapped transport, closed together with this one; schedule: link faults only;
+        network: further delay of the packets to the autopilot."""
         super().__init__(inner)
-        self.timeline = Timeline(schedule)
+        self.timeline, self._network = Timeline(schedule), network
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
+        self._now = 0.0
+        self._outgoing: deque[tuple[float, bytes]] = deque()
         self._incoming: deque[tuple[float, bytes]] = deque()
 
     def update(self, stamp: float) -> list[FaultState]:
-        """See `WaitingTransport`; return the faults that began or ended."""
-        super().update(stamp)
+        """Set the time to `stamp` [s], send what is due; return the faults that began or ended."""
+        self._now = max(self._now, stamp)
+        for data in self._due(self._outgoing):
+            self.inner.send(data)
         return self.timeline.update(stamp)
 
     def send(self, data: bytes) -> bool:
         """Send to the autopilot; active faults lose, delay or corrupt the packet."""
         altered = self._altered(data, [f for f in self.timeline.active if f.outwards])
-        return altered is None or self._send(*altered)
+        if altered is None:
+            return True
+        data, late = altered
+        late += 0.0 if self._network is None else self._network.at(self._now)
+        if not late and not self._outgoing:
+            return self.inner.send(data)
+        self._outgoing.append((self._now + late, data))
+        return True
 
     def receive(self) -> list[bytes]:
         """Return the packets received from the autopilot; active faults apply."""
@@ -125,6 +96,13 @@ class FaultyTransport(WaitingTransport):
                 return None
             data = arriving
         return data, late
+
+    def _due(self, queue: deque[tuple[float, bytes]]) -> list[bytes]:
+        """Remove and return the packets that are due, in order: no packet overtakes another."""
+        found = []
+        while queue and queue[0][0] <= self._now + 1e-9:
+            found.append(queue.popleft()[1])
+        return found
 
 
 class GroundStation(WrappedTransport):
