@@ -31,56 +31,30 @@ _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 _RAISED = {"commander_rc_override", "failsafe_rc_override"}  # severity INFO in PX4, WARNING here
 
 
-_ON_THE_WIRE = (
-    *("id", "event_time_boot_ms", "sequence"),
-    *("destination_component", "destination_system", "log_levels", "arguments"),
+_FIELDS = (  # `event` is MAVLink's `id`, which in pymavlink is the number of the message
+    *("destination_component", "destination_system", "event", "event_time_boot_ms"),
+    *("sequence", "log_levels", "arguments"),
 )
 
 
 class EventMessage(mavlink2.MAVLink_message):
     """EVENT; `arguments`: up to ARGUMENTS bytes; decoding removes trailing zeros."""
 
-    id = 410
-    msgname = "EVENT"
-    ordered_fieldnames = list(_ON_THE_WIRE)
-    orders = [3, 4, 0, 1, 2, 5, 6]
-    fieldnames = [_ON_THE_WIRE[place] for place in orders]
-    fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
-    fielddisplays_by_name: dict[str, str] = {}
-    fieldenums_by_name: dict[str, str] = {}
-    fieldunits_by_name: dict[str, str] = {"event_time_boot_ms": "ms"}
-    native_format = bytearray(b"<IIHBBBB")
+    id, msgname = 410, "EVENT"
+    orders = [3, 4, 0, 1, 2, 5, 6]  # places of _FIELDS on the wire
     lengths = [1, 1, 1, 1, 1, 1, ARGUMENTS]
-    array_lengths = [0, 0, 0, 0, 0, 0, ARGUMENTS]
     crc_extra = 160
     unpacker = struct.Struct(f"<IIHBBB{ARGUMENTS}s")
-    instance_field = None
-    instance_offset = -1
 
-    def __init__(
-        self,
-        destination_component: int,
-        destination_system: int,
-        id: int,
-        event_time_boot_ms: int,
-        sequence: int,
-        log_levels: int,
-        arguments: bytes,
-    ):
-        super().__init__(EventMessage.id, EventMessage.msgname)
-        self._fieldnames = EventMessage.fieldnames
-        self._instance_field, self._instance_offset = None, -1
-        self.destination_component = destination_component
-        self.destination_system = destination_system
-        self.event = id  # not `self.id`: that is the message id
-        self.event_time_boot_ms = event_time_boot_ms
-        self.sequence = sequence
-        self.log_levels = log_levels
-        self.arguments = arguments
+    def __init__(self, *values: int | bytes) -> None:
+        """values: of _FIELDS."""
+        super().__init__(self.id, self.msgname)
+        for name, value in zip(_FIELDS, values, strict=True):
+            setattr(self, name, value)
 
     def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
-        values = (getattr(self, name) for name in _ON_THE_WIRE[1:])
-        payload = self.unpacker.pack(self.event, *values)
+        values = (getattr(self, name) for _, name in sorted(zip(self.orders, _FIELDS, strict=True)))
+        payload = self.unpacker.pack(*values)
         return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
 
