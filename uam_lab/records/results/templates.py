@@ -11,18 +11,22 @@ import jinja2
 
 from uam_control.settings.texts import visible
 
+SHARED = "uam_lab.records.results"  # package of templates that others extend
 MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 
 
 def render(package: str, name: str, **values: Any) -> str:
-    """Return the page of a template from the folder of `package`; a missing value is an error."""
+    """Return the page of a template from the folder of `package`; a missing value is an error.
+
+    The template may extend results.html.j2, the page of an experiment's results.
+    """
     return _template(package, name).render(values)
 
 
 @cache
 def _template(package: str, name: str) -> jinja2.Template:
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader(package, "."),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(one, ".") for one in (package, SHARED)]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
