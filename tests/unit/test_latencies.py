@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_sim_bridge.nodes.latencies import MOST_UNANSWERED, Statistics
+from uam_sim_bridge.nodes.plant_health import MOST_UNANSWERED, Statistics
 
 PERIOD, MS = 0.004, 1_000_000
 TICK = 4 * MS

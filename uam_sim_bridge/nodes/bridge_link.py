@@ -25,7 +25,7 @@ from uam_sim_bridge.mavlink.transport.transport import (
     parse_url,
 )
 from uam_sim_bridge.nodes.bridge_parameters import AUTO, BridgeParameters
-from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
+from uam_sim_bridge.nodes.magnet_driver import MagnetTopics
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 EXIT_TIME = 1.0  # [s] for the acknowledgement at the node's end
@@ -75,7 +75,7 @@ def _required(given: str, url: str, spoken: Firmware) -> RequiredParameters | No
     return None if name == NONE else RequiredParameters.read(name, spoken)
 
 
-class BridgeMagnet:
+class BridgeMagnet(MagnetTopics):
     """Joins commands, link and state. Times [s] are those of the ticks."""
 
     def __init__(
@@ -83,21 +83,21 @@ class BridgeMagnet:
     ) -> None:
         self._node, self._link, self._magnet = node, link, magnet
         self._time = 0.0
-        self._topics = MagnetTopics(node, rules, lambda: self._time)
+        super().__init__(node, rules, lambda: self._time)
 
     def update(self, tick: float) -> None:
         """Take the commands that have arrived by `tick`, and publish the state."""
         self._time = tick
-        self._node.take_waiting(self._topics.subscription)
-        self._magnet.switch(tick, self._topics.switching.desired(tick))
-        self._topics.publish(tick, self._magnet.state)
+        self._node.take_waiting(self.subscription)
+        self._magnet.switch(tick, self.switching.desired(tick))
+        self.publish(tick, self._magnet.state)
 
     def end(self, tick: float) -> None:
         """Leave the magnet as `magnet_at_exit` says; wait at most EXIT_TIME for the answer.
 
         tick: the last one. An autopilot that never answered is not waited for.
         """
-        self._magnet.switch(tick, self._topics.switching.at_exit())
+        self._magnet.switch(tick, self.switching.at_exit())
         begun = time.monotonic()
         while not self._magnet.settled and (spent := time.monotonic() - begun) < EXIT_TIME:
             if not self._link.connected(tick + spent):
@@ -108,7 +108,7 @@ class BridgeMagnet:
 
     def problems(self) -> tuple[str, ...]:
         """Return one line per problem."""
-        found = (self._magnet.problem, self._topics.problem(self._time))
+        found = (self._magnet.problem, self.problem(self._time))
         return tuple(text for text in found if text)
 
     def values(self) -> dict[str, object]:

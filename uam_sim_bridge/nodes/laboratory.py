@@ -10,7 +10,6 @@ import gc
 import math
 import sys
 import time
-from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -74,27 +73,6 @@ class DriverTopic:
         self._own.destroy_node()
 
 
-@dataclass
-class Statistics:
-    """Of a rehearsal, written at its end.
-
-    lost_s: see PacedClock; steps: done by the person; fifo_priority: see `hardware_priority`.
-    """
-
-    ticks: int = 0
-    wall_s: float = 0.0
-    late_ticks: int = 0
-    lost_s: float = 0.0
-    armed: bool = False
-    ended_by: str = ""
-    fifo_priority: int = 0
-    serial_bytes: tuple[int, int] = (0, 0)
-    bus_packets: int = 0
-    bus_packets_damaged: int = 0
-    mocap_frames: int = 0
-    steps: list[str] = field(default_factory=list)
-
-
 class Rehearsal:
     """Laboratory, its topics and its person, tick by tick."""
 
@@ -111,7 +89,7 @@ class Rehearsal:
         p.places.mkdir(parents=True, exist_ok=True)
         chain, cameras = load_chain(hardware_file(p.hardware), vehicle), load(p.calibration)
         self.lab = Laboratory(numbers, p, chain, cameras, faults)
-        self.statistics = Statistics()
+        self._armed, self._ended_by, self._wall, self._priority = False, "", 0.0, 0
         self._changed = self.lab.pull_cables(0.0)  # faults at the start; published later
         self._fault_topic = FaultTopic(node) if faults else None
         self._truth = TruthTopics(node, vehicle)
@@ -140,25 +118,25 @@ class Rehearsal:
 
     def run(self) -> None:
         """Run ticks until the mission is over, the limit of the flight, or a signal."""
-        lab, clock, numbers = self.lab, self.clock, self.statistics
+        lab, clock = self.lab, self.clock
         gc.collect()
         gc.freeze()
-        numbers.fifo_priority = hardware_priority.prefer()
+        self._priority = hardware_priority.prefer()
         clock.begin()
         begin, end = time.monotonic(), FlightEnd(self.parameters.linger)
         limit, latest = self.parameters.flight_limit or math.inf, math.inf
         text = f"time limit of {limit:g} s after arming"
-        while not self._stop.raised and not numbers.ended_by:
+        while not self._stop.raised and not self._ended_by:
             clock.note(lab.plant.tick)
             host = clock.host(lab.plant.tick)
             self._tick(host)
             now = lab.plant.time
-            if lab.hil.armed and not numbers.armed:
-                numbers.armed, latest = True, now + limit
+            if lab.hil.armed and not self._armed:
+                self._armed, latest = True, now + limit
             armed, done = lab.hil.armed, self._mission.done
-            numbers.ended_by = end.reason(now, armed, done, (latest, text))
-        numbers.ended_by = numbers.ended_by or "interrupt"
-        numbers.wall_s = time.monotonic() - begin
+            self._ended_by = end.reason(now, armed, done, (latest, text))
+        self._ended_by = self._ended_by or "interrupt"
+        self._wall = time.monotonic() - begin
 
     def _tick(self, host: float) -> None:
         """Sense, publish, wait for the end of the tick, and step; host: system's time [s]."""
@@ -212,16 +190,22 @@ class Rehearsal:
                 self._confirm.call_async(Trigger.Request())
 
     def report(self) -> dict[str, object]:
-        """Return the statistics so far, for JSON."""
-        lab, numbers = self.lab, self.statistics
-        numbers.ticks, numbers.late_ticks = lab.plant.tick, self.clock.late
-        numbers.lost_s = round(self.clock.lost, 6)
-        numbers.serial_bytes = tuple(lab.cable.carried)
-        numbers.bus_packets = lab.bus.line.instructions
-        numbers.bus_packets_damaged = lab.bus.line.damaged
-        numbers.mocap_frames = lab.mocap.sent
-        numbers.steps = self._person.done
-        return asdict(numbers)
+        """Return the statistics so far, for JSON. lost_s: see PacedClock; steps: of the person."""
+        lab, clock = self.lab, self.clock
+        return {
+            "ticks": lab.plant.tick,
+            "wall_s": self._wall,
+            "late_ticks": clock.late,
+            "lost_s": round(clock.lost, 6),
+            "armed": self._armed,
+            "ended_by": self._ended_by,
+            "fifo_priority": self._priority,
+            "serial_bytes": lab.cable.carried,
+            "bus_packets": lab.bus.line.instructions,
+            "bus_packets_damaged": lab.bus.line.damaged,
+            "mocap_frames": lab.mocap.sent,
+            "steps": self._person.done,
+        }
 
     def close(self) -> None:
         self.lab.close()

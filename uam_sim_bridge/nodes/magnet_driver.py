@@ -1,10 +1,14 @@
-"""Node: /uam/magnet → a GPIO line, with its state on /uam/magnet/state.
+"""Node: /uam/magnet → a GPIO line, with its state on /uam/magnet/state; the bridge has both, too.
 
 For a magnet on an output of the autopilot see the parameter `magnet` of `mavlink_bridge`.
 """
 
 import time
+from collections.abc import Callable
 
+from std_msgs.msg import Bool
+
+from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
@@ -12,14 +16,46 @@ from uam_sim_bridge.devices.magnet.lines import (
     LineParameters,
     MagnetDriver,
     MagnetError,
+    MagnetSwitching,
     SwitchingParameters,
     open_line,
 )
 from uam_sim_bridge.nodes.late_device import LateDevice
-from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 
 NAME = "magnet_driver"
+STATE_PERIOD = 1.0  # [s] between two messages of an unchanged state
 READ_PERIOD = 0.1  # [s] between two looks at the line without a command
+
+
+class MagnetTopics:
+    """`switching`: the desired state by the commands so far."""
+
+    def __init__(
+        self, node: UamNode, parameters: SwitchingParameters, now: Callable[[], float]
+    ) -> None:
+        """now: the time [s] at which a command arrives."""
+        self.switching = MagnetSwitching(parameters)
+        self.subscription = node.listen(
+            topics.MAGNET, lambda message: self.switching.command(now(), message.data)
+        )
+        self._publisher = node.publisher(topics.MAGNET_STATE)
+        self._published: bool | None = None
+        self._due = 0.0
+
+    def publish(self, time: float, state: bool | None) -> None:
+        """Publish the state when it changes, and once per STATE_PERIOD; None: it is unknown."""
+        if state is None:
+            self._published = None
+        elif state is not self._published or time >= self._due:
+            self._published, self._due = state, time + STATE_PERIOD
+            self._publisher.publish(Bool(data=state))
+
+    def problem(self, time: float) -> str:
+        """Return one line if commands are lost, else ""."""
+        if not self.switching.stale(time):
+            return ""
+        word = "on" if self.switching.desired(time) else "off"
+        return f"magnet {word}: commands are lost"
 
 
 class MagnetDriverNode(UamNode):

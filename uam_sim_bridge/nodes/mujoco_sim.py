@@ -17,7 +17,7 @@ realtime  Ticks begin at absolute deadlines of the wall clock, one control perio
           the next deadline the last command holds. The latency of a tick is the time from the
           publication of its IMU sample to that of its setpoint. Beyond one control period the tick
           counts as late. Beyond some periods, or without a setpoint, it counts as missed
-          (`latencies.py`).
+          (`plant_health.Statistics`).
           The bridge publishes /uam/setpoint after it has sent the setpoint to the autopilot.
 """
 
@@ -49,9 +49,8 @@ from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import WAITS, HilServer, open_only_here
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
-from uam_sim_bridge.nodes.latencies import Statistics
 from uam_sim_bridge.nodes.lockstep import Awaited, Lockstep, PlantStopped
-from uam_sim_bridge.nodes.plant_health import PlantHealth
+from uam_sim_bridge.nodes.plant_health import PlantHealth, Statistics
 from uam_sim_bridge.nodes.plant_options import NOT_READY, PlantParameters
 from uam_sim_bridge.nodes.plant_topics import (
     Answers,

@@ -19,7 +19,7 @@ from uam_msgs_py.messages.serialized import deserialized, type_name
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.namespace import expanded
-from uam_sim_bridge.nodes.latencies import DEADLINE_TICKS
+from uam_sim_bridge.nodes.plant_health import DEADLINE_TICKS
 
 ADAPTATION = {
     "position": topics.POSITION_ADAPTATION,
