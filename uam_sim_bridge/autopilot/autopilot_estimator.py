@@ -217,15 +217,11 @@ class Estimator:
         self.estimate[0] = 1.0
         self.memory = record("newest vision_count", "vision_time")
         self._vision_time = -math.inf
-        self._vision_down = np.array([0.0, 0.0, 1.0])
-        self._force = np.zeros(3)
-        self._past = np.zeros((HISTORY, _SPEED))  # attitude and position of the last samples
-        self._past[:, 0] = 1.0  # level before the first sample
-        self._stamps = np.full(HISTORY, -math.inf)  # [s]
-        self._bias = np.zeros(3)
+        past = np.zeros((HISTORY, _SPEED))
+        past[:, 0] = 1.0  # level before the first sample
         self.arrays = EstimatorArrays(
-            *(self.estimate, self._bias, self._force),
-            *(self._past, self._stamps, self._vision_down, self.memory),
+            *(self.estimate, np.zeros(3), np.zeros(3), past, np.full(HISTORY, -math.inf)),
+            *(np.array([0.0, 0.0, 1.0]), self.memory),
         )
         still = np.zeros(3)
         self._fuse = prepared(fuse, still, still, 0.0, 0.0, self.arrays)
@@ -260,10 +256,11 @@ class Estimator:
             return ["Preflight Fail: no valid vision pose (external vision missing)"]
         if self._vision_count < ALIGN_SAMPLES:
             return ["Preflight Fail: attitude estimate not aligned yet"]
-        norm = float(np.linalg.norm(self._force))
+        force, down = self.arrays.mean_force, self.arrays.vision_down
+        norm = float(np.linalg.norm(force))
         if not 0.8 * GRAVITY < norm < 1.2 * GRAVITY:
             return [f"Preflight Fail: accelerometer reads {norm:.1f} m/s^2 at rest"]
-        cosine = float(-self._force @ self._vision_down) / norm
+        cosine = float(-force @ down) / norm
         if cosine < math.cos(MAX_TILT_DIFFERENCE):
             angle = math.degrees(math.acos(max(-1.0, cosine)))
             return [f"Preflight Fail: vision tilt differs from gravity by {angle:.0f} deg"]

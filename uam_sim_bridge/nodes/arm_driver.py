@@ -69,28 +69,9 @@ class ArmDriverNode(UamNode):
         device = declared_text(self, "device", "", about)
         parameters = NodeParameters(self, ArmDriverParameters, read_only=True).current
         chain = _described_chain(hardware, device, vehicle)
-        servos = vehicle.numbers["servos"]
-
-        def unopened() -> ArmDriver:
-            return ArmDriver(
-                chain,
-                parameters,
-                servos["mode"],
-                vehicle.control_period,
-                servos["position_p_gain"],
-            )
-
-        def started() -> ArmDriver:
-            driver = unopened()
-            try:
-                driver.start()
-            except (ArmError, BusLost):
-                driver.bus.close()
-                raise
-            return driver
-
-        self.driver = unopened()
-        self._bus = LateDevice(self, started, (ArmError, BusLost))
+        mode, gain = (vehicle.numbers["servos"][name] for name in ("mode", "position_p_gain"))
+        self.driver = ArmDriver(chain, parameters, mode, vehicle.control_period, gain)
+        self._bus = LateDevice(self, self._started, (ArmError, BusLost))
         self.failure = ""
         self._velocity = None  # (n,) [rad/s] desired
         hand = [GRIPPER] if chain.gripper is not None else []
@@ -116,27 +97,22 @@ class ArmDriverNode(UamNode):
         offer(self, SetBool, "~/release", self._on_release)
         refuse_unknown(self)  # before the bus, which may be absent
         self._bus.begin()
-        if not self._bus.waits:
-            self._take_bus()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._exchange, name="servo bus")
         self._thread.start()
 
-    def _take_bus(self) -> bool:
-        """Use the bus once it is there; return whether it is."""
-        driver = self._bus.attempt()
-        if driver is None:
-            return False
-        if driver is not self.driver:
-            self.driver = driver
-            for remark in driver.remarks:
-                self.get_logger().warning(remark)
-            budget = driver.budget
-            self.get_logger().info(
-                f"{len(self._names)} servos on {driver.chain.device}: {driver.rate:g} Hz, bus load "
-                f"{100 * budget.load(driver.rate):.0f} %, up to {budget.rate:.0f} Hz"
-            )
-        return True
+    def _started(self) -> ArmDriver:
+        """Start the driver; raises ArmError, BusLost."""
+        driver = self.driver
+        driver.start()
+        for remark in driver.remarks:
+            self.get_logger().warning(remark)
+        budget = driver.budget
+        self.get_logger().info(
+            f"{len(self._names)} servos on {driver.chain.device}: {driver.rate:g} Hz, bus load "
+            f"{100 * budget.load(driver.rate):.0f} %, up to {budget.rate:.0f} Hz"
+        )
+        return driver
 
     def _on_effort(self, data: bytes) -> None:
         self.driver.command_effort(read_joint_command(data, self._names), self._velocity)
@@ -177,7 +153,7 @@ class ArmDriverNode(UamNode):
     def _exchange(self) -> None:
         """Run the cycles until the node ends; an error that nothing handles ends the node."""
         try:
-            while not self._take_bus():
+            while self._bus.attempt() is None:
                 if self._ending.wait(ABSENT_WAIT):
                     return
             pace, cycle = PacedClock(1.0 / self.driver.rate, catch_up=math.inf), 0

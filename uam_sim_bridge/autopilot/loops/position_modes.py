@@ -34,14 +34,12 @@ _INTEGRAL = 2.0 * GRAVITY  # m/s^2, limit of the velocity integral
 _LEAST_LIFT = 0.3 * GRAVITY  # m/s^2, smallest upward part of the thrust
 
 
-class PositionControl:
-    """The cascade with its memory; call `reset` while another mode flies."""
+class Cascade:
+    """`setpoint` (4,): body rates [rad/s, FRD], thrust; call `reset` while another mode flies."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.setpoint = np.zeros(4)
         self._integral = np.zeros(3)  # [m/s^2]
-        self._velocity: np.ndarray | None = None  # of the last cycle
-        self._slope = np.zeros(3)  # [m/s^2] low-pass filtered derivative of the velocity
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
@@ -49,6 +47,15 @@ class PositionControl:
         self._position_gain = _gains(p, "P")
         self._p, self._i, self._d = (_gains(p, f"VEL_{kind}_ACC") for kind in "PID")
         self._attitude_gains = attitude_gains(p)
+
+
+class PositionControl(Cascade):
+    """The cascade of OFFBOARD."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        super().__init__(parameters)
+        self._velocity: np.ndarray | None = None  # of the last cycle
+        self._slope = np.zeros(3)  # [m/s^2] low-pass filtered derivative of the velocity
 
     def reset(self) -> None:
         if self._velocity is not None:
@@ -155,28 +162,20 @@ def attitude_of(axis: np.ndarray, yaw: float) -> np.ndarray:
     return quaternion_from_euler(np.array([roll, math.atan2(forward, axis[2]), yaw]))
 
 
-class PositionModes:
-    """The cascade with its memory; call `reset` while another mode flies.
+class PositionModes(Cascade):
+    """The cascade of the modes without a companion.
 
     `sinking`, `climbing`: whether the last setpoint descends to the ground, or climbs by the stick.
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.setpoint = np.zeros(4)
+        super().__init__(parameters)
         self.home = np.zeros(3)  # position of arming [m, NED]
         self.sticks = np.zeros(4)  # forward, right, up, yaw clockwise, -1..1
         self.sinking = self.climbing = False
         self._held: np.ndarray | None = None  # position [m, NED]
         self._mode: Mode | None = None
         self._yaw = 0.0
-        self._integral = np.zeros(3)  # m/s^2
-        self.configure(parameters)
-
-    def configure(self, parameters: Parameters) -> None:
-        p = self._parameters = parameters
-        self._position_gain = _gains(p, "P")
-        self._velocity_gain, self._integral_gain = (_gains(p, f"VEL_{kind}_ACC") for kind in "PI")
-        self._attitude_gains = attitude_gains(p)
 
     def reset(self) -> None:
         self._mode, self.sinking = None, False
@@ -193,9 +192,9 @@ class PositionModes:
             self._integral[:], self.sinking = 0.0, False
         desired = self._desired_velocity(mode, position, dt)
         error = desired - velocity
-        self._integral += self._integral_gain * error * dt
+        self._integral += self._i * error * dt
         np.clip(self._integral, -_INTEGRAL, _INTEGRAL, out=self._integral)
-        acceleration = self._velocity_gain * error + self._integral
+        acceleration = self._p * error + self._integral
         return self._attitude(estimate, acceleration, hover)
 
     def _desired_velocity(self, mode: Mode, position: np.ndarray, dt: float) -> np.ndarray:

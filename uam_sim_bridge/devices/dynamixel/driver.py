@@ -130,13 +130,18 @@ class ArmDriver:
     def start(self) -> None:
         """Open the device, check servos, settings and pose, and fill `remarks`; no torque yet.
 
-        Raises ArmError (wrong servos or settings, a servo that falls silent), BusLost.
+        Raises ArmError (wrong servos or settings, a servo that falls silent), BusLost; the device
+        is closed then.
         """
+        self._fast = self.parameters.fast_sync_read
         try:
             with self.bus.patient(START_ANSWER):
                 self._check()
-        except NoAnswer as error:
-            raise ArmError(f"{self.chain.device}: {error}") from None
+        except (ArmError, BusLost, NoAnswer) as error:
+            self.bus.close()
+            if isinstance(error, NoAnswer):
+                raise ArmError(f"{self.chain.device}: {error}") from None
+            raise
         self._open = True
 
     def _check(self) -> None:
