@@ -96,7 +96,7 @@ def test_without_a_build_each_use_names_its_own_variable(tmp_path, monkeypatch):
     monkeypatch.delenv(LOOP_VARIABLE, raising=False)
     for given in (None, tmp_path):
         with pytest.raises(Px4Error, match=f"--px4-dir DIR or {LOOP_VARIABLE}: .*nolockstep"):
-            Px4Installation.in_the_loop(given)
+            Px4Installation.find(given, LOOP_VARIABLE)
 
 
 def test_a_build_without_its_startup_script_is_refused(build):
@@ -108,11 +108,11 @@ def test_a_build_without_its_startup_script_is_refused(build):
 def test_of_the_sources_builds_the_one_that_the_use_needs_is_taken(build):
     sources = build.parent.parent
     with pytest.raises(Px4Error, match="holds no PX4 build: .*`make px4_sitl_nolockstep`"):
-        Px4Installation.in_the_loop(sources)
+        Px4Installation.find(sources, LOOP_VARIABLE)
     other = shutil.copytree(build, build.with_name("px4_sitl_nolockstep"))
     (build / "px4_boardconfig.h").write_text("#define CONFIG_BOARD_LOCKSTEP 1\n")
     (other / "px4_boardconfig.h").write_text("#define CONFIG_BOARD_NOLOCKSTEP 1\n")
-    assert Px4Installation.in_the_loop(sources).directory == other
+    assert Px4Installation.find(sources, LOOP_VARIABLE).directory == other
     assert Px4Installation.find(sources).directory == build
 
 

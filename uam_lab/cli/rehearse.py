@@ -72,7 +72,7 @@ def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
         if given:
             raise Px4Error("--px4-param needs --px4-dir: the stand-in has no parameter of PX4")
         return None
-    found = Px4Installation.in_the_loop(directory)
+    found = Px4Installation.find(directory, LOOP_VARIABLE)
     px4_parameters.parse(given, found.ranges())
     return found
 

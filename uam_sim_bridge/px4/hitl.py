@@ -105,7 +105,7 @@ def parser() -> Program:
 def prepared(options: argparse.Namespace) -> How:
     """Return how PX4 runs. Raises what `command` reports."""
     line = parse_url(f"serial:{options.companion}")
-    installation = Px4Installation.in_the_loop(options.px4_dir)
+    installation = Px4Installation.find(options.px4_dir, LOOP_VARIABLE)
     vehicle = load_description(options.vehicle)
     given = parameters.load(vehicle, options.params, options.param, installation.ranges())
     values = loop_values(given, vehicle)

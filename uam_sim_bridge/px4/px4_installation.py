@@ -9,25 +9,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-VARIABLE = "PX4_SITL_DIR"
-LOOP_VARIABLE = "PX4_HITL_DIR"  # a build without lockstep, for px4_hitl and uam rehearse
-REQUIRED = (
-    f"--px4-dir DIR or {VARIABLE}: a PX4 build directory with bin/px4 and etc/, "
-    "as build/px4_sitl_default after `make px4_sitl_default`"
-)
-_REQUIRED_IN_LOOP = (
-    f"--px4-dir DIR or {LOOP_VARIABLE}: a PX4 build directory, as build/px4_sitl_nolockstep after "
-    "`make px4_sitl_nolockstep`"
-)
+# of a build, and of one without lockstep, for px4_hitl and uam rehearse
+VARIABLE, LOOP_VARIABLE = "PX4_SITL_DIR", "PX4_HITL_DIR"
+_IN_SOURCES = {VARIABLE: "build/px4_sitl_default", LOOP_VARIABLE: "build/px4_sitl_nolockstep"}
 _STARTUP = "etc/init.d-posix/rcS"
 _LISTED = "parameters.json"
 _BOARD, _OWN_CLOCK = "px4_boardconfig.h", "CONFIG_BOARD_NOLOCKSTEP 1"
+_LOCKSTEP = "made with lockstep; in the loop PX4 has a clock of its own: `make px4_sitl_nolockstep`"
 _GRIPPER = "CONFIG_MODULES_PAYLOAD_DELIVERER 1"
-_WITH_LOCKSTEP, _IN_LOOP = "build/px4_sitl_default", "build/px4_sitl_nolockstep"  # in the sources
 
 
 class Px4Error(ValueError):
     """PX4 cannot be run; the text is one line: what is wrong and what is required."""
+
+
+def required(variable: str) -> str:
+    """Return what --px4-dir, or the variable, must be."""
+    build = _IN_SOURCES[variable]
+    return (
+        f"--px4-dir DIR or {variable}: a PX4 build directory with bin/px4 and etc/, as {build} "
+        f"after `make {Path(build).name}`"
+    )
 
 
 class Range(NamedTuple):
@@ -67,17 +69,6 @@ class Px4Installation:
             for entry in listed
         }
 
-    def require_own_clock(self) -> None:
-        """Raise Px4Error if PX4's clock is the simulator's: this build is made with lockstep.
-
-        A build that does not tell passes.
-        """
-        self._require(
-            _OWN_CLOCK,
-            "made with lockstep; in the loop PX4 has a clock of its own: "
-            "`make px4_sitl_nolockstep`",
-        )
-
     def require_gripper(self) -> None:
         """Raise Px4Error if this build has no module that answers MAV_CMD_DO_GRIPPER.
 
@@ -99,32 +90,20 @@ class Px4Installation:
             raise Px4Error(f"{self.directory}: {otherwise}")
 
     @classmethod
-    def in_the_loop(cls, directory: str | Path | None = None) -> Px4Installation:
-        """Return the build without lockstep in `directory`; None: that of PX4_HITL_DIR.
+    def find(cls, directory: str | Path | None = None, variable: str = VARIABLE) -> Px4Installation:
+        """Return the build in `directory`, or in its place if PX4's sources are there.
 
-        For PX4's source directory it returns the build in build/px4_sitl_nolockstep. Raises
-        Px4Error.
+        directory None: that of the variable. With LOOP_VARIABLE PX4's clock must not be the
+        simulator's; a build that does not tell passes. Raises Px4Error.
         """
-        given = directory or os.environ.get(LOOP_VARIABLE)
-        found = cls._found(given, _IN_LOOP, _REQUIRED_IN_LOOP)
-        found.require_own_clock()
-        return found
-
-    @classmethod
-    def find(cls, directory: str | Path | None = None) -> Px4Installation:
-        """Return the build in `directory`; None: in the directory of the variable PX4_SITL_DIR.
-
-        For PX4's source directory it returns the build in build/px4_sitl_default. Raises Px4Error.
-        """
-        return cls._found(directory or os.environ.get(VARIABLE), _WITH_LOCKSTEP, REQUIRED)
-
-    @classmethod
-    def _found(cls, given: str | Path | None, in_sources: str, required: str) -> Px4Installation:
+        given = directory or os.environ.get(variable)
         if not given:
-            raise Px4Error(f"no PX4 build given: set {required}")
+            raise Px4Error(f"no PX4 build given: set {required(variable)}")
         base = Path(given).expanduser().absolute()
-        for place in (base, base / in_sources):
+        for place in (base, base / _IN_SOURCES[variable]):
             found = cls(place)
             if os.access(found.binary, os.X_OK) and (place / _STARTUP).is_file():
+                if variable == LOOP_VARIABLE:
+                    found._require(_OWN_CLOCK, _LOCKSTEP)
                 return found
-        raise Px4Error(f"{given} holds no PX4 build: set {required}")
+        raise Px4Error(f"{given} holds no PX4 build: set {required(variable)}")

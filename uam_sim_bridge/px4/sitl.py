@@ -26,7 +26,7 @@ from uam_sim_bridge.mavlink.hil.sitl_ports import HOST, Program
 from uam_sim_bridge.ports import SIMULATOR_TCP
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.process import How, Px4Process, add_px4_options, command
-from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Installation
+from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Installation, required
 
 NAME = "px4_sitl"
 HUNG_UP = "the simulator hung up; PX4 starts anew for the next one"
@@ -66,7 +66,7 @@ def _connected(pid: int, port: int) -> bool:
 def parser() -> Program:
     p = Program(__doc__)
     p.instance()
-    add_px4_options(p, REQUIRED)
+    add_px4_options(p, required(VARIABLE))
     p.vehicle()
     p.option("--sim-host", "HOST", "simulator", HOST)
     p.switch("--once", "serve one simulator (default: start PX4 anew for the next one)")
