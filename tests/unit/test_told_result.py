@@ -8,8 +8,10 @@ from uam_lab.cli import rehearse
 from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, fly, tell
 from uam_lab.flights.library.flight_result import FlightResult
 from uam_lab.flights.processes.interrupts import INTERRUPTED
-from uam_lab.records.results.outcome import Outcome
+from uam_lab.records.results.outcome import Outcome, complete
+from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.terminal import Terminal
+from uam_sim_bridge.faults.timeline import record
 
 
 @pytest.mark.parametrize(
@@ -36,3 +38,22 @@ def test_the_reason_goes_to_the_errors_and_the_rest_to_the_output(
 
 def test_a_rehearsal_ends_as_a_flight():
     assert rehearse.fly is fly
+
+
+def test_a_fault_that_did_not_begin_is_a_note(tmp_path, make_flight):
+    series = make_flight()
+    begun = record("mocap_dropout", 5.0, None, {})
+    planned = [
+        {"fault": "mocap_dropout", "at": 5.0},
+        {"fault": "mocap_dropout", "at": "pick", "after": 500.0},
+        {"fault": "motor_loss", "at": 900.0},
+    ]
+    known = series.info | {"faults_planned": planned}
+    outcome = Outcome(series, faults=[begun])
+    for _ in range(2):  # as the flight and as its log
+        complete(ResultFolder(tmp_path), known, outcome)
+    late = "did not begin: the flight ended before"
+    assert outcome.notes == [
+        f"the fault mocap_dropout@pick+500 {late}",
+        f"the fault motor_loss@900.0 {late}",
+    ]

@@ -211,7 +211,8 @@ def timed(entry: Mapping[str, Any], phases: Collection[str] | None, where: str) 
             raise FaultError("after: only together with a phase")
         else:
             at = _span(entry, "at", None)
-        duration = _span(entry, "duration", math.inf)
+        if (duration := _span(entry, "duration", math.inf)) == 0.0:
+            raise FaultError("duration: 0 s is no fault; without a duration it lasts")
     except FaultError as error:
         raise FaultError(f"{where}: {error}") from None
     return TimedFault(fault, at, duration, phase)

@@ -1,5 +1,6 @@
 """Result of a flight, the same for both engines, and what completes its result folder."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -80,6 +81,20 @@ class Outcome:
         return self.failure or self.abort_reason
 
 
+def _not_begun(
+    planned: Sequence[Mapping[str, Any]], begun: Sequence[Mapping[str, Any]]
+) -> list[str]:
+    """Return a note for each fault that did not begin; both as in info.json."""
+    left, notes = Counter(one["fault"] for one in begun), []
+    for one in planned:
+        name, after = one["fault"], one.get("after")
+        left[name] -= 1
+        if left[name] < 0:
+            when = f"{one['at']}+{after:g}" if after else one["at"]
+            notes.append(f"the fault {name}@{when} did not begin: the flight ended before")
+    return notes
+
+
 def complete(
     folder: ResultFolder, known: Mapping[str, Any], outcome: Outcome
 ) -> dict[str, Any] | None:
@@ -98,6 +113,9 @@ def complete(
         "grasps": outcome.grasps,
         "faults": outcome.faults,
     }
+    if outcome.series is not None:
+        late = _not_begun(known.get("faults_planned") or (), outcome.faults)
+        outcome.notes.extend(note for note in late if note not in outcome.notes)
     if outcome.errors_of:
         info["errors_of"] = outcome.errors_of
         text = f"errors are {outcome.errors_of} − reference: a vehicle has no simulator's truth"
