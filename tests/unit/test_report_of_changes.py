@@ -37,9 +37,9 @@ def test_a_change_is_read_back_from_its_message():
 
 def test_numbers_that_would_overlap_share_one_label():
     info = {"parameter_changes": [entry(t, varpi=[0.1, 0.2]) for t in (1.0, 1.1, 1.2, 9.0)]}
-    assert parameter_table.labels(parameter_table.rows(info), 1.0) == [(1.0, "1–3"), (9.0, "4")]
+    assert parameter_table.labels(parameter_table.changes(info), 1.0) == [(1.0, "1–3"), (9.0, "4")]
     many = {"parameter_changes": [entry(float(t)) for t in range(100)]}
-    assert parameter_table.labels(parameter_table.rows(many), 0.5) == []
+    assert parameter_table.labels(parameter_table.changes(many), 0.5) == []
 
 
 def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):

@@ -1,6 +1,6 @@
 """The flown parameters beside the paper's Table I, active safeguards, and changes in flight."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -108,6 +108,8 @@ def _same(one: Any, other: Any) -> bool:
 
 def text(value: Any) -> str:
     """Return a parameter value as text; a list of equal entries is written once."""
+    if value is None:
+        return "–"
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, int | float):
@@ -118,35 +120,12 @@ def text(value: Any) -> str:
     return str(value)
 
 
-@dataclass(frozen=True)
-class ChangeRow:
-    """One request: its number in the figures, mission time [s], and its result."""
+def changes(info: Mapping[str, Any]) -> list[tuple[int, dict[str, Any]]]:
+    """Return every request of a flight with its number in the figures, in order.
 
-    number: int
-    time: float
-    node: str
-    by: str
-    accepted: bool
-    reason: str
-    values: tuple[tuple[str, str, str], ...]  # name, old, new
-
-
-def rows(info: Mapping[str, Any]) -> list[ChangeRow]:
-    """Return every request of a flight, in order; info: see `log_reader.parameter_changes`."""
-    return [
-        ChangeRow(
-            number=number,
-            time=one["time_s"],
-            node=one["node"],
-            by=one["by"],
-            accepted=one["accepted"],
-            reason=one["reason"],
-            values=tuple(
-                (name, _text(old), _text(new)) for name, (old, new) in one["values"].items()
-            ),
-        )
-        for number, one in enumerate(info.get("parameter_changes") or [], start=1)
-    ]
+    info: see `log_reader.parameter_changes`.
+    """
+    return list(enumerate(info.get("parameter_changes") or [], start=1))
 
 
 def together(marks: Iterable[tuple[float, Any]], apart: float) -> list[tuple[float, list[Any]]]:
@@ -161,9 +140,9 @@ def together(marks: Iterable[tuple[float, Any]], apart: float) -> list[tuple[flo
     return groups
 
 
-def labels(shown: Sequence[ChangeRow], apart: float) -> list[tuple[float, str]]:
-    """Return (time, text) of the labels; requests closer than `apart` [s] share one label."""
-    groups = together([(row.time, row.number) for row in shown], apart)
+def labels(shown: Iterable[tuple[int, dict]], apart: float) -> list[tuple[float, str]]:
+    """Return (time, text) of the labels of `changes`; those closer than `apart` [s] share one."""
+    groups = together([(one["time_s"], number) for number, one in shown], apart)
     if len(groups) > LABELS:
         return []
     return [(time, _span(numbers[0], numbers[-1])) for time, numbers in groups]
@@ -171,7 +150,3 @@ def labels(shown: Sequence[ChangeRow], apart: float) -> list[tuple[float, str]]:
 
 def _span(first: int, last: int) -> str:
     return str(first) if first == last else f"{first}–{last}"
-
-
-def _text(value: Any) -> str:
-    return "–" if value is None else text(value)

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from uam_lab.records.results.timeseries import ON_GROUND, Series
 from uam_lab.report.facts import parameter_table
-from uam_lab.report.facts.parameter_table import text, together
+from uam_lab.report.facts.parameter_table import together
 from uam_lab.report.figures import style
 
 if TYPE_CHECKING:
@@ -26,29 +26,12 @@ SHADE = 0.16  # opacity
 LETTER = {"fontsize": 7.0, "fontweight": "bold", "color": style.FAULT}
 
 
-@dataclass(frozen=True)
-class FaultMark:
-    """One fault: its letter in the figures, name, mission times [s], parameters."""
+def fault_marks(info: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Return every fault of a flight with its letter in the figures, in order.
 
-    letter: str
-    name: str
-    begin: float
-    end: float | None  # None: active until the end of the flight
-    values: tuple[tuple[str, str], ...]
-
-
-def fault_rows(info: Mapping[str, Any]) -> list[FaultMark]:
-    """Return every fault of a flight, in order; info: with `faults` as in metrics.json."""
-    return [
-        FaultMark(
-            letter=letter(number),
-            name=one["fault"],
-            begin=one["begin_s"],
-            end=one["end_s"],
-            values=tuple((name, text(value)) for name, value in one["parameters"].items()),
-        )
-        for number, one in enumerate(info.get("faults") or [])
-    ]
+    info: with `faults` as in metrics.json.
+    """
+    return [(letter(number), one) for number, one in enumerate(info.get("faults") or [])]
 
 
 def letter(number: int) -> str:
@@ -59,13 +42,16 @@ def letter(number: int) -> str:
 
 def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -> None:
     """Shade the time span of each fault in all panels, with its letter in the top row."""
-    shown = [row for row in fault_rows(info) if row.begin <= end and (row.end or end) >= start]
-    for row in shown:
-        begin, over = max(row.begin, start), min(end if row.end is None else row.end, end)
+    shown = [
+        (max(one["begin_s"], start), end if one["end_s"] is None else min(one["end_s"], end), name)
+        for name, one in fault_marks(info)
+        if one["begin_s"] <= end and (one["end_s"] or end) >= start
+    ]
+    for begin, over, _ in shown:
         for axis in axes.flat:
             axis.axvspan(begin, over, color=style.FAULT, alpha=SHADE, linewidth=0.0, zorder=0.5)
             axis.axvline(begin, color=style.FAULT, linewidth=0.8, zorder=2.3)
-    marks = sorted((max(row.begin, start), row.letter) for row in shown)
+    marks = sorted((begin, name) for begin, _, name in shown)
     for axis in axes[0]:
         for at, letters in together(marks, APART * (end - start)):
             style.note(axis, " ".join(letters), (at, 0.0), (2, 2), **LETTER)
@@ -73,7 +59,7 @@ def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -
 
 def fault_handles(info: Mapping[str, Any]) -> list[Line2D]:
     """Return the legend entry of the faults, if there are any."""
-    if not fault_rows(info):
+    if not info.get("faults"):
         return []
     return [style.key("fault", style.FAULT, 6.0, alpha=2.0 * SHADE)]
 
@@ -245,9 +231,13 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
 
 def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
     """Mark each change of parameters by a thin line (dotted: refused) and its number."""
-    shown = [row for row in parameter_table.rows(series.info) if start <= row.time <= end]
+    shown = [
+        (number, one)
+        for number, one in parameter_table.changes(series.info)
+        if start <= one["time_s"] <= end
+    ]
     for accepted, colour, dashes, _ in CHANGES:
-        times = [row.time for row in shown if row.accepted == accepted]
+        times = [one["time_s"] for _, one in shown if one["accepted"] == accepted]
         for axis in axes.flat if times else ():
             axis.vlines(
                 times,
@@ -280,7 +270,7 @@ def legend(
     handles = flight_keys(flights)
     named = dict.fromkeys((name, colour) for _, colour, name in marked)
     handles += [style.key(name, colour, 0.9, MAGNET_DASHES) for name, colour in named]
-    results = {row.accepted for row in parameter_table.rows(flights[0].series.info)}
+    results = {one["accepted"] for _, one in parameter_table.changes(flights[0].series.info)}
     handles += [
         style.key(name, colour, 0.8, dashes)
         for accepted, colour, dashes, name in CHANGES

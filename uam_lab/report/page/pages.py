@@ -65,8 +65,9 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         phases=flight_summary.phase_rows(metrics),
         phase_headings=flight_summary.PHASE_HEADINGS,
         clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
-        changes=parameter_table.rows(info),
-        faults=panels.fault_rows(info),
+        changes=parameter_table.changes(info),
+        faults=panels.fault_marks(info),
+        text=parameter_table.text,
         facts=[
             (label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS.items()
         ],
