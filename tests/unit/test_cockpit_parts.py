@@ -10,6 +10,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hypothesis import given
 from hypothesis import strategies as st
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.supervision import PreflightCheck
@@ -17,7 +18,6 @@ from uam_lab.cockpit import page_address
 from uam_lab.cockpit.gains import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import ChecklistPanel, _facts, checklist_html, headline
 from uam_lab.cockpit.page import BUTTONS
-from uam_lab.cockpit.services import About
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, CHAIN, GOOD, TICK, UNKNOWN, Health, grade
 from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView, shapes
 from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
@@ -44,8 +44,10 @@ LIMITS = {
 numbers = st.floats(-1e6, 1e6)
 
 
-def about(constraints: str, low=None, high=None) -> About:
-    return About("gain", "a gain [1/s]", constraints, (), low, high, False)
+def about(constraints: str, low=None, high=None) -> ParameterDescriptor:
+    span = [] if low is None else [FloatingPointRange(from_value=low, to_value=high)]
+    described = {"additional_constraints": constraints, "floating_point_range": span}
+    return ParameterDescriptor(name="gain", description="a gain [1/s]", **described)
 
 
 @given(st.one_of(numbers, st.lists(numbers, min_size=1, max_size=4), st.booleans()))

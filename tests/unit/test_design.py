@@ -310,7 +310,7 @@ def test_margins_that_contradict_each_other_end_the_search(monkeypatch, tmp_path
 
     def evaluated(self):
         fast = self.shares[-1] == 1.0
-        return search.Found(described, None, (), {described.coordinates[-1]: faults[fast]})
+        return search.Design(described, None, (), {described.coordinates[-1]: faults[fast]})
 
     monkeypatch.setattr(search.Search, "evaluated", evaluated)
     with pytest.raises(DesignError, match=r"keep all margins: .*too slow, or .*too fast"):

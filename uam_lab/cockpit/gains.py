@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import viser
+from rcl_interfaces.msg import ParameterDescriptor
 
 from uam_lab.cockpit.commands import Later, Said
-from uam_lab.cockpit.services import About, RemoteParameters
+from uam_lab.cockpit.services import RemoteParameters
 from uam_lab.cockpit.texts import shown
 
 REACH = 4.0  # end of a slider / initial value
@@ -47,7 +48,7 @@ def _number(text: str) -> float:
         raise ValueError(f"{text.strip() or 'nothing'}: a number expected") from None
 
 
-def reach(about: About, value: float) -> tuple[float, float, float]:
+def reach(about: ParameterDescriptor, value: float) -> tuple[float, float, float]:
     """Return (low, high, step) of a slider with the initial value `value`."""
     low, high = bounds(about)
     low = max(low, min(0.0, REACH * value))
@@ -57,20 +58,26 @@ def reach(about: About, value: float) -> tuple[float, float, float]:
     return low, high, (high - low) / STEPS or 1.0
 
 
-def bounds(about: About) -> tuple[float, float]:
+def bounds(about: ParameterDescriptor) -> tuple[float, float]:
     """Return the range declared by the node; for a vector that of each entry."""
-    if about.low is not None and about.high is not None:
-        return about.low, about.high
-    words = about.constraints.removeprefix("each ").split()
+    for span in about.floating_point_range:
+        return span.from_value, span.to_value
+    words = about.additional_constraints.removeprefix("each ").split()
     try:
         return float(words[0]), float(words[2])
     except (IndexError, ValueError):
         return -np.inf, np.inf
 
 
-def axes(about: About, count: int) -> Sequence[str]:
+def choices(about: ParameterDescriptor) -> tuple[str, ...]:
+    """Return the allowed words, () for another type."""
+    _, marked, words = about.additional_constraints.partition("one of: ")
+    return tuple(words.split(", ")) if marked else ()
+
+
+def axes(about: ParameterDescriptor, count: int) -> Sequence[str]:
     """Return the names of a vector's entries from its constraints, or their numbers."""
-    _, _, listed = about.constraints.partition("; ")
+    _, _, listed = about.additional_constraints.partition("; ")
     names = [name.strip() for name in listed.split(",") if name.strip()]
     return names if len(names) == count else [str(number) for number in range(count)]
 
@@ -79,22 +86,23 @@ class ParameterEntry:
     """One parameter: a folder with its meaning, a field, and a slider for each number."""
 
     def __init__(
-        self, gui: viser.GuiApi, about: About, remote: RemoteParameters, later: Later, said: Said
+        self, gui: viser.GuiApi, name: str, remote: RemoteParameters, later: Later, said: Said
     ):
-        self._about, self._remote, self._later, self._said = about, remote, later, said
-        self._name = about.name
+        self._about = about = remote.known[name]
+        self._remote, self._later, self._said = remote, later, said
+        self._name, self._choices = name, choices(about)
         self._sent = 0.0
         self._desired: Any = None  # value of the sliders that is not yet requested
         value = remote.values[self._name]
         self._folder = gui.add_folder(self._label(value), expand_by_default=self._name in OPEN)
         self._sliders: list[viser.GuiSliderHandle] = []
         with self._folder:
-            gui.add_html(shown([about.description, about.constraints]))
+            gui.add_html(shown([about.description, about.additional_constraints]))
             if isinstance(value, bool):
                 self._field: Any = gui.add_checkbox(self._name, value)
                 self._field.on_update(self._entered)
-            elif about.choices:
-                self._field = gui.add_dropdown(self._name, about.choices, initial_value=value)
+            elif self._choices:
+                self._field = gui.add_dropdown(self._name, self._choices, initial_value=value)
                 self._field.on_update(self._entered)
             else:
                 with gui.add_form(None) as form:
@@ -173,7 +181,7 @@ class ParameterEntry:
         """Show the active value."""
         self._remote.values[self._name] = value
         self._folder.label = self._label(value)
-        shown = value if isinstance(value, bool) or self._about.choices else text_of(value)
+        shown = value if isinstance(value, bool) or self._choices else text_of(value)
         if self._field.value != shown:
             self._field.value = shown
         if self._desired is not None:
@@ -202,7 +210,7 @@ class NodeGains:
         with tab:
             for name, about in sorted(remote.known.items(), key=lambda item: item[0] not in OPEN):
                 if not about.read_only and name in remote.values:
-                    self._entries[name] = ParameterEntry(gui, about, remote, later, said)
+                    self._entries[name] = ParameterEntry(gui, name, remote, later, said)
 
     def look(self) -> None:
         """Request the values of moved sliders."""

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -76,25 +75,12 @@ class Services:
                 self._open.append((client, future, end, answer))
 
 
-@dataclass(frozen=True)
-class About:
-    """Description of one parameter. choices: the allowed words, () for other types."""
-
-    name: str
-    description: str
-    constraints: str
-    choices: tuple[str, ...]
-    low: float | None
-    high: float | None
-    read_only: bool
-
-
 class RemoteParameters:
-    """Parameters of one node. `known` contains their descriptions after `load`."""
+    """Parameters of one node. `known` contains their descriptors after `load`."""
 
     def __init__(self, services: Services, node: str):
         self.node = node
-        self.known: dict[str, About] = {}
+        self.known: dict[str, ParameterDescriptor] = {}
         self.values: dict[str, Any] = {}
         self._services = services
 
@@ -121,7 +107,7 @@ class RemoteParameters:
             if why:
                 done(why)
                 return
-            self.known = {one.name: _about(one) for one in response.descriptors}
+            self.known = {one.name: one for one in response.descriptors}
             self.refresh(done)
 
         self._call(ListParameters, "list_parameters", ListParameters.Request(), listed)
@@ -151,17 +137,3 @@ class RemoteParameters:
         messages = [Parameter(name, value=v).to_parameter_msg() for name, v in changes.items()]
         request = SetParametersAtomically.Request(parameters=messages)
         self._call(SetParametersAtomically, "set_parameters_atomically", request, answered)
-
-
-def _about(said: ParameterDescriptor) -> About:
-    span = said.floating_point_range
-    _, marked, words = said.additional_constraints.partition("one of: ")
-    return About(
-        said.name,
-        said.description,
-        said.additional_constraints,
-        tuple(words.split(", ")) if marked else (),
-        span[0].from_value if span else None,
-        span[0].to_value if span else None,
-        said.read_only,
-    )

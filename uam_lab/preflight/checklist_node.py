@@ -133,8 +133,9 @@ class ChecklistNode:
         before = len(self._checklist.entries)
         self._checklist.update(now, automatic(seen, self._limits.current), seen.armed)
         for entry in self._checklist.entries[before:]:
-            if entry.kind == GUIDED:
-                self._node.get_logger().info(f"{entry.name} {entry.state}: {entry.value}")
+            if entry["kind"] == GUIDED:
+                text = f"{entry['name']} {entry['state']}: {entry['value']}"
+                self._node.get_logger().info(text)
         self._act(self._checklist.step)
         self._services.look()
         self._record()  # before a reader hears of it

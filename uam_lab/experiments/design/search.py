@@ -8,7 +8,7 @@ All loops are judged together, because each closes around the others.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -48,18 +48,32 @@ OBSERVED = 0.23  # periods of its bandwidth, by which the observer's velocity of
 ROUND_DOWN = 1e3  # the profile's delay margin is a whole number of milliseconds
 
 
+class Fault(NamedTuple):
+    """Why a loop's bandwidth must change, and by which factor."""
+
+    why: str
+    factor: float = STEP
+
+
 @dataclass(frozen=True)
 class Design:
     """A designed vehicle.
 
-    described: with the designed gains of the autopilot; profile: for it; limits: loop → what keeps
-    it from being faster; cases: the analysed operating points.
+    described: with the designed gains of the autopilot; profile: for it; cases: the analysed
+    operating points; faults: loop → why its bandwidth must change, {} of one with all margins;
+    limits: loop → what keeps it from being faster.
     """
 
     described: VehicleDescription
     profile: Profile
-    limits: dict[str, str]
     cases: tuple[Case, ...]
+    faults: dict[str, Fault]
+    limits: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> str:
+        """Return the faults in one line."""
+        return "; ".join(f"{loop}: {f.why}" for loop, f in self.faults.items()) or "margins are met"
 
 
 def design(
@@ -91,28 +105,6 @@ def design(
     raise DesignError(
         f"{described.name}: no gains within {number} rounds: {found.summary}; --criteria"
     )
-
-
-class Fault(NamedTuple):
-    """Why a loop's bandwidth must change, and by which factor."""
-
-    why: str
-    factor: float = STEP
-
-
-@dataclass(frozen=True)
-class Found:
-    """An evaluation: profile, vehicle, cases, and the loops whose bandwidth must change."""
-
-    described: VehicleDescription
-    profile: Profile
-    cases: tuple[Case, ...]
-    faults: dict[str, Fault]
-
-    @property
-    def summary(self) -> str:
-        """Return the faults in one line."""
-        return "; ".join(f"{loop}: {f.why}" for loop, f in self.faults.items()) or "margins are met"
 
 
 class Search:
@@ -216,7 +208,7 @@ class Search:
             self._limits.setdefault(name, text if late < one else f"torque {torque:.2g} N m")
         return np.minimum(late, strong)
 
-    def evaluated(self) -> Found:
+    def evaluated(self) -> Design:
         """Return the margins with the present bandwidths."""
         bandwidths = self.bandwidths()
         gains = self._described.autopilot_gains | autopilot_gains(bandwidths)
@@ -236,8 +228,8 @@ class Search:
                 named = {
                     loop: one._replace(why=f"{one.why}, {label}") for loop, one in faults.items()
                 }
-                return Found(described, profile, tuple(cases), named)
-        return Found(described, profile, tuple(cases), {})
+                return Design(described, profile, tuple(cases), named)
+        return Design(described, profile, tuple(cases), {})
 
     def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, Fault]:
         """Return the fault of each loop that has one."""
@@ -272,12 +264,12 @@ class Search:
         for loop, fault in faults.items():
             self._limits[loop] = fault.why
 
-    def result(self, found: Found) -> Design:
+    def result(self, found: Design) -> Design:
         """Return the design; its profile has the delay margin of the cases."""
         least = min(case.analysis.setpoint_delay for case in found.cases)
         margin = min(1.0, math.floor(ROUND_DOWN * least) / ROUND_DOWN)
         profile = found.profile.changed(found.profile.name, {"mission": {"delay_margin": margin}})
-        return Design(found.described, profile, dict(self._limits), found.cases)
+        return replace(found, profile=profile, limits=dict(self._limits))
 
 
 def shortfall(margins: Margins, wanted: SimpleNamespace, joint: bool) -> Fault | None:

@@ -33,17 +33,6 @@ LOWEST, FREQUENCIES = 0.05, 1200  # [rad/s] and number, up to half the tick rate
 GROWTH = 1e-3  # [1/s] of a mode that counts as unstable
 
 
-@dataclass(frozen=True)
-class Loop:
-    """One loop: its coordinate of chi, and the signals that are opened together.
-
-    One scalar goes through the signals: tau of the coordinate, or its body-rate setpoint.
-    """
-
-    coordinate: str
-    signals: tuple[str, ...]
-
-
 class GrowingMode(NamedTuple):
     """A mode of the closed system: growth [1/s], negative if it decays, at a frequency [rad/s]."""
 
@@ -74,11 +63,14 @@ class Analysis:
         return self.mode.growth < GROWTH
 
 
-def loops_of(coordinates: Sequence[str]) -> tuple[Loop, ...]:
-    """Return the loops of a vehicle with these coordinates of chi."""
+def loops_of(coordinates: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return coordinate of chi → the signals that are opened together for its loop.
+
+    One scalar goes through the signals: tau of the coordinate, or its body-rate setpoint.
+    """
     by_state = (*coordinates[POSITION], *coordinates[ARM])
-    rates = [Loop(name.partition(".")[2], (name,)) for name in RATES]
-    return (*rates, *(Loop(name, (f"state.{name}", f"state.{name}_dot")) for name in by_state))
+    rates = {name.partition(".")[2]: (name,) for name in RATES}
+    return rates | {name: (f"state.{name}", f"state.{name}_dot") for name in by_state}
 
 
 def analyse(stack: Stack) -> Analysis:
@@ -86,7 +78,7 @@ def analyse(stack: Stack) -> Analysis:
     loops = loops_of(stack.coordinates)
     driven = {name for block in stack.blocks for name in block.outputs}
     hand = [name for name in hand_signals(stack.coordinates[ARM]) if name in driven]
-    signals = [*dict.fromkeys(s for loop in loops for s in loop.signals), THRUST, *hand]
+    signals = [*dict.fromkeys(s for loop in loops.values() for s in loop), THRUST, *hand]
     steps = [f"state.{name}" for name in stack.coordinates]
     added = list(dict.fromkeys(signals + steps))
     whole = join(stack.blocks, added=added)
@@ -103,10 +95,10 @@ def analyse(stack: Stack) -> Analysis:
         return t @ np.linalg.inv(np.eye(len(at)) - t)
 
     found = {}
-    for loop in loops:
+    for coordinate, loop in loops.items():
         # one scalar goes through the signals, and 1 + L is the determinant
-        value = np.linalg.det(np.eye(len(loop.signals)) + opened(loop.signals)) - 1.0
-        found[loop.coordinate] = value, margins(omega, value)
+        value = np.linalg.det(np.eye(len(loop)) + opened(loop)) - 1.0
+        found[coordinate] = value, margins(omega, value)
     return Analysis(
         omega,
         found,

@@ -7,7 +7,6 @@ Nothing changes while the vehicle is armed.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -18,27 +17,14 @@ from uam_lab.preflight.checklist.step import Situation, Step, StepState
 AUTOMATIC, GUIDED = "automatic", "guided"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """An event of the record: an item that has changed, at `time` [s] of the stamps."""
-
-    time: float
-    kind: str
-    name: str
-    state: str
-    value: str
-    limit: str
-    confirmed: bool = False
-    tries: int = 0
-
-
 class Checklist:
-    """`findings`: of the automatic items; `steps`: of the guided ones; `entries`: the record."""
+    """`findings`: of the automatic items; `steps`: of the guided ones; `entries`: the record,
+    the changes of items with the time [s] of the stamps."""
 
     def __init__(self, steps: Sequence[Step]) -> None:
         self.steps = list(steps)
         self.findings: tuple[PreflightCheck, ...] = ()
-        self.entries: list[Entry] = []
+        self.entries: list[dict[str, Any]] = []
         self._time = 0.0
         self._armed = False
         self._noted: dict[str, tuple[str, str]] = {}
@@ -147,18 +133,9 @@ class Checklist:
         if self._noted.get(finding.name) == now:
             return
         self._noted[finding.name] = now
-        self.entries.append(
-            Entry(
-                self._time,
-                kind,
-                finding.name,
-                state.value,
-                finding.value,
-                finding.limit,
-                confirmed,
-                tries,
-            )
-        )
+        entry = {"time": self._time, "kind": kind, "name": finding.name, "state": state.value}
+        entry |= {"value": finding.value, "limit": finding.limit}
+        self.entries.append(entry | {"confirmed": confirmed, "tries": tries})
 
 
 def record(
@@ -185,7 +162,7 @@ def record(
              "value": one.value, "limit": one.limit, "time": moment(one.ended),
              "confirmed_by_person": one.confirmed, "tries": one.tries}
         )  # fmt: skip
-    events = [asdict(one) | {"time": moment(one.time)} for one in checklist.entries]
+    events = [one | {"time": moment(one["time"])} for one in checklist.entries]
     return {
         "passed": checklist.passed,
         "failing": checklist.failing_names,
