@@ -31,7 +31,6 @@ if backend.startswith("module://") and find_spec(backend[9:].split(".")[0]) is N
 
 
 def __getattr__(name: str) -> Any:
-    """Return an offered name."""
     if name not in OFFERED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.flights.library.{OFFERED[name]}"), name)

@@ -133,7 +133,6 @@ class Command:
         self.option("--answer-timeout", "S", text, 0.05, type=wait)
 
     def scenario(self) -> None:
-        """Add --scenario."""
         text = f"{', '.join(configuration.names('scenarios'))}, or a .yaml or .csv file"
         self.option("--scenario", "NAME|FILE", text, "pick_and_place")
 
@@ -157,7 +156,6 @@ class Command:
         self.repeated("--effect", "SPEC", text, dest="effects")
 
     def seed(self, what: str) -> None:
-        """Add --seed."""
         self.option("--seed", "N", what, 1, type=seed)
 
     def workers(self, with_ros: bool = False) -> None:

@@ -20,7 +20,6 @@ class Output:
         stream.reconfigure(errors="replace")  # an encoding may lack a letter
 
     def write(self, text: str) -> int:
-        """Write a text."""
         try:
             return self._stream.write(text)
         except OSError as error:

@@ -125,7 +125,6 @@ class Commands:
         return question(button, self._health)
 
     def call(self, button: Button) -> None:
-        """Call the services of the command."""
         kind = _kind(button)
         request = Trigger.Request() if button.on is None else SetBool.Request(data=button.on)
         for name in button.services:

@@ -19,7 +19,6 @@ INTERVAL = 0.15  # [s] minimum wall time between two requests of a slider
 
 
 def text_of(value: Any) -> str:
-    """Return a value as text."""
     if isinstance(value, list):
         return ", ".join(text_of(one) for one in value)
     if isinstance(value, bool):
@@ -178,7 +177,6 @@ class ParameterEntry:
         self.show(self._remote.values[self._name])
 
     def show(self, value: Any) -> None:
-        """Show the active value."""
         self._remote.values[self._name] = value
         self._folder.label = self._label(value)
         shown = value if isinstance(value, bool) or self._choices else text_of(value)

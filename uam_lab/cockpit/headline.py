@@ -165,7 +165,6 @@ class ChecklistPanel:
         self._shown = ""
 
     def show(self, message: Any) -> None:
-        """Show a message of /uam/checklist."""
         state = ChecklistState.from_message(message)[1]
         shown = checklist_html(state, read_items(message))
         if self._html is None:

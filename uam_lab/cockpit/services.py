@@ -89,7 +89,6 @@ class RemoteParameters:
 
     @property
     def is_there(self) -> bool:
-        """Whether the node offers its parameters."""
         return self._services.ready(ListParameters, f"{self.node}/list_parameters")
 
     def load(self, done: Callable[[str], None]) -> None:

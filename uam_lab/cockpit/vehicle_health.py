@@ -77,7 +77,6 @@ class Health:
         self.errors = tuple(float(np.linalg.norm(error[p])) for p in (POSITION, ATTITUDE, ARM))
 
     def diagnose(self, message: DiagnosticArray) -> None:
-        """Store a message of /diagnostics."""
         for status in message.status:
             name = unlabelled(self.namespace, status.name)
             if name is None:

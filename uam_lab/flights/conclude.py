@@ -10,7 +10,6 @@ from uam_lab.records.results.result_folder import ResultFolder, versions, write_
 
 
 def command_line() -> str:
-    """Return the command line of the user."""
     return shlex.join(["uam", *sys.argv[1:]])
 
 

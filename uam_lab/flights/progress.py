@@ -58,7 +58,6 @@ class Progress(Observer):
                 self.message(f"{one.name}: {state}: {one.text}{check}")
 
     def update(self, status: FlightStatus) -> None:
-        """Show the newest status."""
         if not self.console.is_terminal:
             self._plain(status)
             return
@@ -133,7 +132,6 @@ def gist(text: str) -> str:
 
 
 def device_table(devices: Iterable[DeviceState]) -> Table:
-    """Return the table of the devices."""
     table = Table("device", "", "found", "check by", box=None, padding=(0, 2), header_style="dim")
     for one in devices:
         state = Text("present", "green") if one.present else Text("missing", "bold yellow")

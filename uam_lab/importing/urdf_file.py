@@ -145,11 +145,9 @@ class _Urdf:
         return Source(self.file, spec, lines, meshes.files, rotors, facts, meshes.notes)
 
     def where(self, element: XmlElement) -> str:
-        """Return file and line of an element."""
         return f"{self.file} line {element.sourceline}"
 
     def error(self, element: XmlElement, text: str) -> ImportRefused:
-        """Return the refusal of an element."""
         return ImportRefused(f"{self.where(element)}: {text}")
 
     def _named(self, kind: str) -> dict[str, XmlElement]:

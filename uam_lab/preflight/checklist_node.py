@@ -176,7 +176,6 @@ class ChecklistNode:
 
     @property
     def state(self) -> ChecklistState:
-        """Return the state for /uam/checklist."""
         checklist = self._checklist
         step = checklist.step
         failing = "; ".join(checklist.failing_names)

@@ -115,7 +115,6 @@ class Draws(Sequence[Trial]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the drawn values."""
         return (*NAMES, *(name for name in DELAYS if name in self.ranges))
 
     def chosen(self, numbers: str) -> Sequence[int]:

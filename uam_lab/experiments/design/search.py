@@ -232,7 +232,6 @@ class Search:
         return Design(described, profile, tuple(cases), {})
 
     def _failing(self, stack: Stack, analysis: Analysis) -> dict[str, Fault]:
-        """Return the fault of each loop that has one."""
         wanted, found = self._criteria.margins, {}
         joints = stack.coordinates[YAW + 1 :]
         for loop, (_, margins) in analysis.loops.items():

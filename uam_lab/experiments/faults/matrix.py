@@ -92,7 +92,6 @@ class Matrix:
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the rows."""
         if self.draws:
             names = dict.fromkeys(entry["fault"] for entry in self.faults)
             return tuple(name + more for name in names for more in ("", AND))

@@ -113,7 +113,6 @@ class Group:
 
     @property
     def outcome(self) -> str:
-        """The worst outcome."""
         return max((r.outcome for r in self.results), key=list(OUTCOMES).index)
 
     def __str__(self) -> str:

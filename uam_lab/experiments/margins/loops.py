@@ -74,7 +74,6 @@ def loops_of(coordinates: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def analyse(stack: Stack) -> Analysis:
-    """Return the margins of all loops of the stack."""
     loops = loops_of(stack.coordinates)
     driven = {name for block in stack.blocks for name in block.outputs}
     hand = [name for name in hand_signals(stack.coordinates[ARM]) if name in driven]

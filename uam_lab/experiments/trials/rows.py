@@ -50,7 +50,6 @@ class Rows:
         return pa.schema(found)
 
     def to_row(self, key: Any, result: Any) -> dict[str, Any]:
-        """Return the row of a result."""
         row = {self.key.name: key}
         for name, kind in self._fields().items():
             value = getattr(result, name)
@@ -62,7 +61,6 @@ class Rows:
         return row
 
     def from_row(self, row: Mapping[str, Any]) -> Any:
-        """Return the result of a row."""
         found = {}
         for name, kind in self._fields().items():
             if name in self.parts:

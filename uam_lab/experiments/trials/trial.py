@@ -110,7 +110,6 @@ class TrialResult:
 
     @property
     def completed(self) -> bool:
-        """Whether the mission was completed."""
         return self.outcome == COMPLETED
 
     @property

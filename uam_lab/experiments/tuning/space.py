@@ -122,7 +122,6 @@ class Space:
         return replace(self, flights=tuple(flights))
 
     def trials(self, profile: Profile) -> list[Trial]:
-        """Return the flights that evaluate a profile."""
         return [
             Trial(
                 self.name,

@@ -156,7 +156,6 @@ class CompiledTicks:
 
     @property
     def _sampled(self) -> bool:
-        """Whether a compiled step samples the plant."""
         return self._compiled_plant and not self._flight.plant.senses
 
     @property
@@ -221,7 +220,6 @@ class CompiledTicks:
         return control.mission.look_ahead(min(most, self._flight.recorder.left, to_report))
 
     def _take_report(self) -> None:
-        """Take the report of the last compiled tick, if it has one."""
         control = self._flight.control
         signals = control.signals
         report = control.bridge.resume(signals.stamp, signals.state)

@@ -150,12 +150,10 @@ class DirectFlight:
 
     @property
     def mission(self) -> Mission:
-        """The mission of the flight."""
         return self.control.mission.mission
 
     @property
     def armed(self) -> bool:
-        """Whether the autopilot is armed."""
         return self.autopilot.autopilot.commander.armed
 
     def outcome(self, info: Mapping[str, Any] | None = None, **more: Any) -> Outcome:

@@ -58,7 +58,6 @@ class Commands:
             return act(self._clients[kind][1])
 
     def close(self) -> None:
-        """Close the clients."""
         with self._lock:
             for guest, _ in self._clients.values():
                 guest.close()

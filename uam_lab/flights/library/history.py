@@ -40,14 +40,12 @@ class History(Observer):
         self._further.message(text)
 
     def started(self, domain: int | None) -> None:
-        """Note the start of the flight."""
         with self._news:
             self.running, self.domain = True, domain
             self._news.notify_all()
         self._further.started(domain)
 
     def update(self, status: FlightStatus) -> None:
-        """Store a status."""
         with self._news:
             self.statuses.append(status)
             self._count += 1
@@ -55,7 +53,6 @@ class History(Observer):
         self._further.update(status)
 
     def end(self) -> None:
-        """Note the end of the flight."""
         with self._news:
             self.running, self.over = False, True
             self._news.notify_all()

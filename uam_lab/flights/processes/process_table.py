@@ -69,7 +69,6 @@ def users_of_port(protocol: str, port: int) -> list[str]:
 
 
 def users_of_file(path: Path) -> list[str]:
-    """Return the processes that have the file open."""
     return [name_of(one.pid) for one in psutil.process_iter() if str(path) in _open_files(one)]
 
 

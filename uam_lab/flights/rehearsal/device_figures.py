@@ -74,7 +74,6 @@ def values_of(messages: Iterable[DiagnosticArray]) -> dict[str, list[Mapping[str
 
 
 def of_reports(reports: Mapping[str, list[Mapping[str, str]]]) -> dict[str, float]:
-    """Return the figures of the nodes' reports."""
     figures = {}
     for chosen, reduce in ((MEDIANS, median_low), (LARGEST, max)):
         for node, keys in chosen.items():
@@ -87,7 +86,6 @@ def of_reports(reports: Mapping[str, list[Mapping[str, str]]]) -> dict[str, floa
 
 
 def of_laboratory(numbers: Mapping[str, Any]) -> dict[str, float]:
-    """Return the figures of the laboratory's statistics."""
     wall = numbers.get("wall_s") or 0.0
     if not wall:
         return {}

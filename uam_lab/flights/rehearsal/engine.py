@@ -178,7 +178,6 @@ class RehearsalCourse(VehicleCourse):
         return (f"{where}; devices in {devices_of(self.flight.folder)}",)
 
     def begin(self) -> None:
-        """Let the person begin."""
         super().begin()
         self._starter = self.enter_context(Starter(self.flight.guest, self._lists))
 
@@ -196,7 +195,6 @@ class RehearsalCourse(VehicleCourse):
 
 
 def devices_of(folder: ResultFolder) -> Path:
-    """Return the folder of the emulated devices."""
     return (folder.path / "devices").absolute()
 
 

@@ -276,7 +276,6 @@ def remappings(settings: FlightSettings, node: str) -> list[str]:
 
 
 def common_remappings(settings: FlightSettings) -> list[str]:
-    """Return the ROS arguments with the remappings of every node."""
     return remappings(settings, EVERY_NODE)
 
 

@@ -133,7 +133,6 @@ class ChangedParameters:
                 self.note(change)
 
     def note(self, change: ParameterChange) -> None:
-        """Store a change if it was accepted."""
         if change.accepted:
             values = {name: new for name, (_, new) in change.values.items()}
             self._newest.setdefault(change.node, {}).update(values)
@@ -233,7 +232,6 @@ class Course(ExitStack):
         self.flight = flight
 
     def start(self) -> None:
-        """Start the processes."""
         raise NotImplementedError
 
     def announcement(self) -> Iterable[str]:

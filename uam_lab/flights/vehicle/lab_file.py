@@ -150,7 +150,6 @@ def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSet
 
 
 def template() -> str:
-    """Return the commented template of a lab file."""
     return lab_path(TEMPLATE).read_text(encoding="utf-8")
 
 

@@ -116,7 +116,6 @@ def publishers(lab: Lab) -> str:
 
 
 def wires(lab: Lab) -> list[wiring.Wire]:
-    """Return the connections between the nodes of a vehicle."""
     goals = lab.vehicle.numbers["servos"]["mode"] == POSITION_SERVO
     commands = topics.ARM_GOALS if goals else topics.ARM_EFFORT
     subscribers = {commands.name: wiring.ARM_DRIVER}

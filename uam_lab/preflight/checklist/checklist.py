@@ -45,7 +45,6 @@ class Checklist:
 
     @property
     def passed(self) -> bool:
-        """Return whether every item has passed."""
         return not self.failing_names
 
     def update(self, now: Situation, findings: Iterable[PreflightCheck], armed: bool) -> None:

@@ -32,7 +32,6 @@ class MagnetStep(Step):
         self._begun = 0.0
 
     def begin(self, time: float) -> None:
-        """Switch the magnet."""
         super().begin(time)
         self._begun, self.needs = time, ""
 
@@ -66,7 +65,6 @@ class KillStep(Step):
         self._longest = 0.0
 
     def begin(self, time: float) -> None:
-        """Wait for the switch."""
         super().begin(time)
         self._since, self._longest, self.needs = None, 0.0, CONFIRM
 

@@ -23,7 +23,6 @@ class Finding:
 
 
 def ok(check: str, found: str) -> Finding:
-    """Return a finding without a problem."""
     return Finding(check, Verdict.OK, one_line(found))
 
 

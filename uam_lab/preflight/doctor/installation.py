@@ -19,7 +19,6 @@ AGAIN = "make setup, or pip install again"
 
 
 def checks() -> Iterator[Finding]:
-    """Yield the findings about the installation."""
     yield python(sys.version_info[:3])
     yield packages(_requirements())
     yield config()

@@ -17,7 +17,6 @@ MEMORY = 2.0  # [GiB]
 
 
 def checks() -> Iterator[Finding]:
-    """Yield the findings about the machine."""
     yield cores(len(os.sched_getaffinity(0)), os.getloadavg()[0])
     yield memory(psutil.virtual_memory().available / 2**30)
     yield shared(shortage())

@@ -41,7 +41,6 @@ def checks() -> Iterator[Finding]:
 
 
 def drawn(platform: str, said: Said) -> Finding:
-    """Return the finding about a rendered frame."""
     facts = said.facts
     device = facts["device"] or "unknown renderer"
     kind = ", in software" if any(word in device for word in SOFTWARE) else ""

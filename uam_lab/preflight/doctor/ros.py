@@ -34,7 +34,6 @@ BY_HAND = "uam fly sets its own domain; nodes started by hand"
 
 
 def checks(surroundings: Mapping[str, str] = os.environ) -> Iterator[Finding]:
-    """Yield the findings about ROS."""
     spec = importlib.util.find_spec("rclpy")
     if spec is None or spec.origin is None:
         yield fail("rclpy", "not installed: only --engine direct works", INSTALL)

@@ -56,7 +56,6 @@ def read(log: Path) -> LogFacts:
 
 
 def options_of(info: Mapping[str, Any]) -> ScenarioOptions:
-    """Return the options of the scenario in the facts of a flight."""
     return ScenarioOptions.from_mapping(dict(info.get("scenario_options") or {}))
 
 

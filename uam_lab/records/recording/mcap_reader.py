@@ -77,7 +77,6 @@ class _Topics:
         self._logs: dict[int, TopicLog] = {}  # channel id → its topic's messages
 
     def read(self, records: bytes) -> None:
-        """Take the records of a chunk."""
         at, end = 0, len(records)
         while at < end:
             opcode, length = HEADER.unpack_from(records, at)

@@ -125,7 +125,6 @@ class ResultFolder:
         return self.path.parent / LATEST
 
     def refuse_flight(self) -> None:
-        """Raise ResultFolderError if the folder contains a flight."""
         if any(file.exists() for file in (self.metrics, self.timeseries, self.log)):
             raise ResultFolderError(
                 f"result folder {self.path} already contains a flight; give another --out"

@@ -107,12 +107,10 @@ class Columns:
 
     @property
     def joints(self) -> int:
-        """Number of joints of the arm."""
         return self.size - ALPHA
 
     @cached_property
     def rotors(self) -> int:
-        """Number of rotors."""
         return sum(name.startswith("rotor_") and name.endswith(".thrust") for name in self.names)
 
     def __len__(self) -> int:
@@ -147,7 +145,6 @@ def columns(joints: int, rotors: int, hand: bool = False, fingers: bool = False)
 
 
 def columns_of(vehicle: VehicleDescription) -> Columns:
-    """Return the columns of a vehicle."""
     hand = Flyer.with_hand(vehicle) is not None
     fingers = vehicle.gripper.kind == TWO_FINGER
     return columns(len(vehicle.joints), len(vehicle.rotors), hand, fingers)

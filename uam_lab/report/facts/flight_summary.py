@@ -48,7 +48,6 @@ def not_compared(metrics: Mapping[str, Any]) -> str:
 
 
 def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
-    """Return one row per coordinate."""
     rows = []
     for group, heading, unit, digits, names in paper.tables(len(metrics["rms"]["arm_deg"])):
         columns = zip(

@@ -60,7 +60,6 @@ def tracking_errors(group: int, flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def _beside(axis: Axes, height: float, text: str, **look: Any) -> None:
-    """Write a text beside a panel."""
     look = {"fontsize": 7.5, "color": style.MUTED, "va": "center", **look}
     axis.text(1.02, height, text, transform=axis.transAxes, **look)
 

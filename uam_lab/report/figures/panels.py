@@ -281,7 +281,6 @@ def legend(
 
 
 def flight_keys(flights: Sequence[DrawnFlight]) -> list[Line2D]:
-    """Return the entries of the legend for the flights."""
     return [style.key(f.label, style.flight_colour(n), 1.1) for n, f in enumerate(flights)]
 
 

@@ -75,7 +75,6 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
 
 
 def phase_table(metrics: Mapping[str, Any]) -> Table:
-    """Return the table of the errors of every phase."""
     table = Table(title="RMS error by phase", title_justify="left", padding=(0, 0, 0, 1))
     for heading in flight_summary.PHASE_HEADINGS:
         if heading == "phase":  # a long name is folded, no number is cut
