@@ -1,5 +1,7 @@
 """`uam arm` on emulated servos behind a pseudo-terminal."""
 
+from contextlib import closing
+
 import pytest
 from arm_rig import BAUD, STOWED
 from servo_shafts import StillShaft
@@ -11,9 +13,8 @@ from uam_sim_bridge.devices.dynamixel.emulated import EmulatedBus, EmulatedServo
 @pytest.fixture
 def bus():
     shafts = [StillShaft(angle) for angle in STOWED]
-    with EmulatedBus(
-        [EmulatedServo(i + 1, one, baud_rate=BAUD) for i, one in enumerate(shafts)]
-    ) as made:
+    servos = [EmulatedServo(i + 1, one, baud_rate=BAUD) for i, one in enumerate(shafts)]
+    with closing(EmulatedBus(servos)) as made:
         yield made
 
 

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -402,7 +403,7 @@ def test_the_whole_driver_behind_a_device(tmp_path):
     """Over a pseudo-terminal, unplugged and plugged in again."""
     shafts = [StillShaft(angle) for angle in STOWED]
     servos = [EmulatedServo(i + 1, one, baud_rate=BAUD) for i, one in enumerate(shafts)]
-    with EmulatedBus(servos, link=tmp_path / "ttyARM") as device:
+    with closing(EmulatedBus(servos, link=tmp_path / "ttyARM")) as device:
         parameters = ArmDriverParameters(
             answer_timeout=PATIENT, reopen_interval=0.01, effort_timeout=PATIENT, watchdog=2.5
         )

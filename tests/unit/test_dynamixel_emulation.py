@@ -3,6 +3,7 @@
 import math
 import random
 import time
+from contextlib import closing
 
 import pytest
 from arm_rig import BAUD, PATIENT, ArmRig, LinePort, described, raw_bus
@@ -337,7 +338,7 @@ def test_no_instruction_breaks_a_servo(address, length, data):
 @pytest.fixture
 def device(tmp_path):
     servos = [EmulatedServo(i, StillShaft(0.1 * i), baud_rate=BAUD) for i in (1, 2, 3)]
-    with EmulatedBus(servos, link=tmp_path / "ttyARM") as made:
+    with closing(EmulatedBus(servos, link=tmp_path / "ttyARM")) as made:
         yield made
 
 
@@ -357,7 +358,7 @@ def test_the_library_reads_servos_behind_a_device(device):
 def test_the_answers_take_their_time_on_the_wire():
     """At 57600 baud, with return delay and latency timer; a sleep is never too short."""
     servo = EmulatedServo(1, StillShaft())
-    with EmulatedBus([servo], timing=True, latency_timer=0.016) as device:
+    with closing(EmulatedBus([servo], timing=True, latency_timer=0.016)) as device:
         bus = DynamixelBus(device.port, 57600, PATIENT)
         bus.open()
         begun = time.monotonic()

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -210,7 +211,7 @@ def test_the_command_on_a_device(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(identify_joint, "pacing", pacing)
     monkeypatch.setattr(identify_joint, "CLOCK", clock)
-    with EmulatedBus(servos) as device:
+    with closing(EmulatedBus(servos)) as device:
         wait = ["--answer-timeout", "5", "--device", device.port]
         monkeypatch.setattr("builtins.input", lambda text: "no")
         assert main(["identify-joint", "alpha_2", *wait, "--out", str(tmp_path / "none")]) == 1

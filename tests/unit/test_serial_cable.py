@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def test_the_rate_of_bit_errors():
 
 @pytest.fixture
 def cable(tmp_path):
-    with SerialCable(tmp_path / "ttyNEAR", tmp_path / "ttyFAR", BAUD) as made:
+    with closing(SerialCable(tmp_path / "ttyNEAR", tmp_path / "ttyFAR", BAUD)) as made:
         yield made
 
 

@@ -174,12 +174,6 @@ class SerialCable:
         self._ends: list[PseudoTerminal | None] = [PseudoTerminal(near), PseudoTerminal(far)]
         self._thread.start()
 
-    def __enter__(self) -> SerialCable:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def unplug(self) -> None:
         """Remove the near device, as a pulled USB adapter."""
         with self._thread.changed():

@@ -29,7 +29,7 @@ import sys
 import time as clock
 from collections.abc import Sequence
 
-from uam_sim_bridge.mavlink.hil.sitl_ports import Program, UdpPort, connect, fill_ports, number
+from uam_sim_bridge.mavlink.hil.sitl_ports import Program, UdpPort, connect, fill_ports, within
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 from uam_sim_bridge.mavlink.transport.pacing import Meter, Outbox
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, Transport, open_transport
@@ -243,7 +243,7 @@ def parser() -> Program:
     p = Program(__doc__)
     p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
     text = "highest rate of HIL_SENSOR (default: the rate that the line carries, up to 250)"
-    p.option("--hil-rate", "HZ", text, type=number("rate in Hz", 1.0, 1000.0))
+    p.option("--hil-rate", "HZ", text, type=within(float, "a rate in Hz", 1.0, 1000.0))
     p.ports()
     return p
 

@@ -99,27 +99,19 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
     return link
 
 
-def whole(what: str, low: int, high: int) -> Callable[[str], int]:
-    """Return an argparse type: an integer from `low` to `high`; what: its name in errors."""
+def within(kind: Callable[[str], float], what: str, low: float, high: float) -> Callable:
+    """Return an argparse type: a number of a kind, int or float, from `low` to `high`.
 
-    def read(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError(f"{text} is not {what} ({low}..{high})")
-        return int(text)
-
-    return read
-
-
-def number(what: str, low: float, high: float) -> Callable[[str], float]:
-    """Return an argparse type: a number from `low` to `high`; what: its name in errors."""
+    what: its name in errors.
+    """
 
     def read(text: str) -> float:
         try:
-            value = float(text)
+            value = kind(text)
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text} is not a {what} ({low:g}..{high:g})")
+            raise argparse.ArgumentTypeError(f"{text} is not {what} ({low:.9g}..{high:.9g})")
         return value
 
     return read
@@ -148,7 +140,7 @@ class Program(argparse.ArgumentParser):
 
     def instance(self) -> None:
         text = "PX4 instance number, added to the default ports (default %(default)s)"
-        kind = whole("an instance number", 0, 254)
+        kind = within(int, "an instance number", 0, 254)
         self.add_argument("-i", "--instance", type=kind, default=0, metavar="N", help=text)
 
     def vehicle(self) -> None:
@@ -158,13 +150,13 @@ class Program(argparse.ArgumentParser):
     def ports(self) -> None:
         """Add the options of instance, simulator and companion ports."""
         self.instance()
-        port = whole("a port", 1, 65535)
+        port = within(int, "a port", 1, 65535)
         self.option("--sim-host", "HOST", "simulator", HOST)
         self.option("--sim-port", "PORT", "simulator (default 4560 + N)", type=port)
         self.option("--mavlink-port", "PORT", "own UDP port (default 14580 + N)", type=port)
         text = "UDP destination until a peer sends a message (default 14540 + N)"
         self.option("--companion-port", "PORT", text, type=port)
-        wait = number("time in seconds", 0.0, 86400.0)
+        wait = within(float, "a time in seconds", 0.0, 86400.0)
         self.option("--wait", "SECONDS", "longest wait for the simulator", 60.0, type=wait)
 
 

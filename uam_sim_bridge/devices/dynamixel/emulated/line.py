@@ -195,12 +195,6 @@ class EmulatedBus:
         self.plug_in()
         self._thread.start()
 
-    def __enter__(self) -> EmulatedBus:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def plug_in(self) -> None:
         """Create the device; its path is `port`."""
         with self._thread.changed():
