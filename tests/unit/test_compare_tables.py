@@ -6,7 +6,6 @@ import pytest
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.experiments.compare import comparison_report, modularity, plan, tables
-from uam_lab.experiments.compare.modularity import ModularityEvidence
 from uam_lab.experiments.compare.plan import ASMC1, ASMC2, FROZEN, PROPOSED, entries
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 
@@ -64,7 +63,7 @@ def test_a_report_without_the_papers_rows_overlays_the_first_ones(tmp_path, make
     series = tmp_path / "series.parquet"
     make_flight().write(series)
     trial = Trial(FROZEN, default_profile("modular"), 0.2, 1, keep=series)
-    modular = ModularityEvidence((flight(FROZEN, 1, 0.1),), ())
+    modular = modularity.claim({}), modularity.tables({}, (flight(FROZEN, 1, 0.1),))
     facts = dict.fromkeys(("vehicle", "scenario", "command"), "x")
     facts |= {"payloads_kg": (0.2,), "seeds": (1,), "profiles": {}, "budgets": {}}
     results = [flight(FROZEN, 1, 0.1)]

@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
     results = comparison.fly_all(every, _about)
     comparison.write_csv()
     results, others = results[: len(trials)], results[len(trials) :]
-    modular = modularity.ModularityEvidence.of(proposed, kept, others)
+    modular = modularity.evidence(proposed, kept, others)
     facts = {
         "command": command_line(),
         "engine": options.engine,

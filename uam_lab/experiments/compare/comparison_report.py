@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from uam_control.profiles.profile import Profile
 from uam_control.settings.atomic import write_text
 from uam_lab.experiments.compare import plan, tables
-from uam_lab.experiments.compare.modularity import ModularityEvidence
+from uam_lab.experiments.compare.modularity import Table
 from uam_lab.experiments.trials.trial import Trial, TrialResult
 from uam_lab.records.results import templates, timeseries
 from uam_lab.records.results.result_folder import versions, write_json
@@ -48,7 +48,7 @@ def write(
     out: Path,
     trials: Sequence[Trial],
     results: Sequence[TrialResult],
-    modular: ModularityEvidence,
+    modular: tuple[str, Sequence[Table]],
     facts: Mapping[str, Any],
 ) -> tuple[str, Path]:
     """Write comparison.json, tables.md, figures/ and report.html to `out`.
@@ -56,9 +56,10 @@ def write(
     Returns a text for the console, and the page.
     """
     found = tables.rows(results)
-    claims = [*tables.claims(found), modular.claim]
+    modularity, modular_tables = modular
+    claims = [*tables.claims(found), modularity]
     markdown = tables.as_markdown(found)
-    for table in modular.tables():
+    for table in modular_tables:
         markdown += f"\n{templates.markdown_table(*table)}\n"
     numbers = {
         row.label: {
@@ -93,7 +94,7 @@ def write(
         "report.html.j2",
         tables=tables.error_tables(found),
         claims=claims,
-        modularity=modular.tables(),
+        modularity=modular_tables,
         pictures=pictures,
         facts=facts,
         confidence=tables.CONFIDENCE,

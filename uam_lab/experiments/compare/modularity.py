@@ -6,10 +6,8 @@ must be equal bit for bit. Flight: the vehicle also flies with the changed set, 
 reported.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -30,17 +28,9 @@ SUBSYSTEMS = {
 FACTOR = 0.8  # on lambda_1 and lambda_2 of the changed subsystem
 
 
-@dataclass(frozen=True)
-class Untouched:
-    """Largest difference of output and adapted gains of each subsystem, over a replayed flight."""
-
-    changed: str
-    differences: dict[str, float]
-
-    @property
-    def holds(self) -> bool:
-        """Whether only the changed subsystem differs."""
-        return all((d > 0.0) == (name == self.changed) for name, d in self.differences.items())
+Table = tuple[list[str], list[list[str]]]  # head, rows
+# changed subsystem → subsystem → largest difference of output and adapted gains, over a replay
+Replays = Mapping[str, Mapping[str, float]]
 
 
 def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile:
@@ -63,17 +53,13 @@ def trials(profile: Profile, flights: Flights, keep: Path) -> list[Trial]:
     ]
 
 
-def untouched(profile: Profile, series: Series, period: float) -> list[Untouched]:
+def replays(profile: Profile, series: Series, period: float) -> Replays:
     """Replay the flight with each subsystem changed in turn; period: of the control tick [s]."""
     plain = _replay(profile, series, period)
-    found = []
+    found = {}
     for name in SUBSYSTEMS:
         other = _replay(changed(profile, name), series, period)
-        found.append(
-            Untouched(
-                name, {key: float(np.max(np.abs(plain[key] - other[key]))) for key in SUBSYSTEMS}
-            )
-        )
+        found[name] = {k: float(np.max(np.abs(plain[k] - other[k]))) for k in SUBSYSTEMS}
     return found
 
 
@@ -94,57 +80,45 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
     return {name: np.array(values) for name, values in out.items()}
 
 
-@dataclass(frozen=True)
-class ModularityEvidence:
-    """Results of the replays and of the flights."""
+def evidence(
+    profile: Profile, kept: Path, flights: Sequence[TrialResult]
+) -> tuple[str, list[Table]]:
+    """Return the result as a sentence, and its two tables.
 
-    flights: tuple[TrialResult, ...]
-    replays: tuple[Untouched, ...]
+    kept: series of the unchanged flight; flights: results of `trials`.
+    """
+    flight = timeseries.read(kept)
+    found = replays(profile, flight, float(np.median(np.diff(flight.time))))
+    return claim(found), tables(found, flights)
 
-    @classmethod
-    def of(cls, profile: Profile, series: Path, flights: Sequence[TrialResult]) -> Self:
-        """Return the evidence from the recorded flight `series` and the results of `trials`."""
-        flight = timeseries.read(series)
-        period = float(np.median(np.diff(flight.time)))
-        return cls(tuple(flights), tuple(untouched(profile, flight, period)))
 
-    @property
-    def claim(self) -> str:
-        """The result as a sentence."""
-        if all(replay.holds for replay in self.replays):
-            return (
-                "A change of one subsystem's gains changes no output and no adapted gain of the "
-                "other two laws: they are equal bit for bit along the same flight."
-            )
-        broken = [replay.changed for replay in self.replays if not replay.holds]
+def holds(name: str, differences: Mapping[str, float]) -> bool:
+    """Return whether only the changed subsystem `name` differs."""
+    return all((d > 0.0) == (other == name) for other, d in differences.items())
+
+
+def claim(found: Replays) -> str:
+    """Return the result as a sentence."""
+    if broken := [name for name, differences in found.items() if not holds(name, differences)]:
         return f"A change of the gains of {', '.join(broken)} changes another subsystem's law."
+    return (
+        "A change of one subsystem's gains changes no output and no adapted gain of the other two "
+        "laws: they are equal bit for bit along the same flight."
+    )
 
-    def tables(self) -> list[tuple[list[str], list[list[str]]]]:
-        """Return (head, rows) of the two tables."""
-        replays = [
-            [
-                replay.changed,
-                *(f"{replay.differences[name]:.3g}" for name in SUBSYSTEMS),
-                "yes" if replay.holds else "no",
-            ]
-            for replay in self.replays
-        ]
-        flights = [
-            [
-                flight.label,
-                *(f"{value:.3g}" for value in flight.rms),
-                "yes" if flight.completed else "no",
-            ]
-            for flight in self.flights
-        ]
-        return [
-            (
-                [
-                    "changed gains of",
-                    *(f"largest change of {name}" for name in SUBSYSTEMS),
-                    "others unchanged",
-                ],
-                replays,
-            ),
-            (["RMS error [m, deg]", *self.flights[0].coordinates, "completed"], flights),
-        ]
+
+def tables(found: Replays, flights: Sequence[TrialResult]) -> list[Table]:
+    """Return the tables of the replays and of the flights."""
+    largest = [f"largest change of {name}" for name in SUBSYSTEMS]
+    replayed = [
+        [name, *(f"{d:.3g}" for d in one.values()), "yes" if holds(name, one) else "no"]
+        for name, one in found.items()
+    ]
+    flown = [
+        [one.label, *(f"{value:.3g}" for value in one.rms), "yes" if one.completed else "no"]
+        for one in flights
+    ]
+    return [
+        (["changed gains of", *largest, "others unchanged"], replayed),
+        (["RMS error [m, deg]", *flights[0].coordinates, "completed"], flown),
+    ]
