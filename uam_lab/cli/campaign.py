@@ -78,7 +78,8 @@ def run(options: argparse.Namespace) -> int:
         return _replay(draws[numbers[0]], numbers[0], options.out)
 
     from uam_lab.experiments.campaign import report
-    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.carried import inputs
+    from uam_lab.experiments.trials.experiment import TABLE, Experiment
 
     out = make_folder(options.out, "campaign")
     given = {"--seed": str(options.seed), "ranges": allowed, "effects": effects}
@@ -91,7 +92,9 @@ def run(options: argparse.Namespace) -> int:
         bad += not result.completed
         return f"{bad} not completed"
 
-    campaign = Experiment.of("campaign", out, rows, place, vehicle, options.scenario, given)
+    campaign = Experiment(
+        "campaign", out / TABLE, rows, inputs(vehicle, options.scenario, given), place
+    )
     results = campaign.fly(numbers, draws.__getitem__, describe)
     campaign.write_csv()
     names = ("flights", "seed", "vehicle", "scenario", "ranges")

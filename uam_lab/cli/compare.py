@@ -64,7 +64,8 @@ def _about(result: TrialResult) -> str:
 
 def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.compare import comparison_report, modularity
-    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.carried import inputs
+    from uam_lab.experiments.trials.experiment import TABLE, Experiment
 
     if options.engine == "ros":
         require_ros()
@@ -87,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
     profiles = [(label, one.sets, one.bridge()) for label, one in rows.items()]
     of = {"profiles": profiles, "flights": (payloads, seeds, options.engine, effects)}
     table = result_rows(len(vehicle.joints))
-    comparison = Experiment.of("compare", out, table, place, vehicle, scenario, of)
+    comparison = Experiment("compare", out / TABLE, table, inputs(vehicle, scenario, of), place)
     results = comparison.fly_all(every, _about)
     comparison.write_csv()
     results, others = results[: len(trials)], results[len(trials) :]

@@ -33,7 +33,8 @@ def add(command: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.duel import flights
     from uam_lab.experiments.duel.flights import ROWS, load_duel, measure, trials
-    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.carried import inputs
+    from uam_lab.experiments.trials.experiment import TABLE, Experiment
 
     duel = load_duel(options.name, tuple(options.rows or ()))
     seeds = options.seeds or duel.seeds
@@ -41,8 +42,8 @@ def run(options: argparse.Namespace) -> int:
     profiles = [(label, one.sets, one.bridge()) for label, one in duel.rows.items()]
     given = {"profiles": profiles, "plant": duel.plant, "scenarios": duel.scenarios, "seeds": seeds}
     out = make_folder(options.out, "duel")
-    of = place_of(options), duel.vehicle, duel.scenarios[0], given
-    experiment = Experiment.of("duel", out, ROWS, *of, measure)
+    known = inputs(duel.vehicle, duel.scenarios[0], given)
+    experiment = Experiment("duel", out / TABLE, ROWS, known, place_of(options), measure)
     text = flights.tables(duel, experiment.fly_all(planned, _about))
     write_text(out / "tables.md", f"{text}\nMade by `{command_line()}`.\n")
     say(text)

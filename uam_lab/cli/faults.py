@@ -84,7 +84,8 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.faults import matrix as fault_matrix
     from uam_lab.experiments.faults import report
     from uam_lab.experiments.faults.trial import ROWS, FaultTrial
-    from uam_lab.experiments.trials.experiment import Experiment
+    from uam_lab.experiments.trials.carried import inputs
+    from uam_lab.experiments.trials.experiment import TABLE, Experiment
 
     place = place_of(options)
     check_clock(options.engine, options.clock)
@@ -134,7 +135,9 @@ def run(options: argparse.Namespace) -> int:
     settings = {name: str(vars(options)[name]) for name in ("seed", "repeat", "engine", "clock")}
     further = lab, profile.sets, profile.bridge(), changes
     of = settings | {"matrix": known, "profile and effects": further}
-    experiment = Experiment.of(kind, out, ROWS, place, vehicle, matrix.scenario, of, measure)
+    experiment = Experiment(
+        kind, out / TABLE, ROWS, inputs(vehicle, matrix.scenario, of), place, measure
+    )
     trials = [flight(label=cell.fault, faults=cell.schedule, cell=cell) for cell in cells]
     results = experiment.fly_all(trials, _about)
     where = {"engine": options.engine, "scenario": matrix.scenario}

@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import pyarrow.parquet as pq
 from pyarrow.csv import write_csv
 
 from uam_control.settings.atomic import replacing
-from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.trials.carried import arrived, carried, inputs
+from uam_lab.experiments.trials.carried import arrived, carried
 from uam_lab.experiments.trials.counting import Counting
 from uam_lab.experiments.trials.rows import Rows, RowTable
 from uam_lab.experiments.trials.trial import Trial, measure
@@ -25,6 +24,7 @@ from uam_lab.experiments.workers.workers import workers
 from uam_lab.flights.direct.warm_up import prepare
 from uam_lab.records.results.terminal import say
 
+TABLE = "flights.parquet"  # in the result folder
 Work = Callable[[Any], Any]
 
 
@@ -32,7 +32,7 @@ Work = Callable[[Any], Any]
 class Experiment:
     """Flights of one kind, and the table of their results.
 
-    name: for the progress; inputs: name → digest of what all flights depend on; work: flies a trial
+    name: for the progress; table: its file; inputs: see `carried.inputs`; work: flies a trial
     and returns its result.
     """
 
@@ -42,22 +42,6 @@ class Experiment:
     inputs: Mapping[str, str]
     place: Workplace
     work: Work = measure
-
-    @classmethod
-    def of(
-        cls,
-        name: str,
-        out: Path,
-        rows: Rows,
-        place: Workplace,
-        vehicle: VehicleDescription,
-        scenario: str,
-        given: Mapping[str, object],
-        work: Work = measure,
-    ) -> Self:
-        """Return an experiment with its table in the folder `out`; given: see `carried.inputs`."""
-        of = inputs(vehicle, scenario, given)
-        return cls(name, out / "flights.parquet", rows, of, place, work)
 
     def write_csv(self) -> None:
         """Write the table beside itself as CSV, for a spreadsheet."""
