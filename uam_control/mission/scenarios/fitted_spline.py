@@ -24,13 +24,14 @@ from uam_control.mission.motion.trajectory import Move
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-    from scipy.sparse import csc_matrix, csr_matrix
+    from scipy.sparse import csc_matrix
 
 # scipy is imported where it is used: that takes most of a second, and few processes read a file
 
 DEGREE = 7
 COARSEST = 0.2  # [s] distance of the knots in the first attempt, or that of the samples
 LONG_GAP = 2.0  # [s] between two samples: the normal equations lose the curve in longer ones
+RESIDUALS = 1e-4  # of their scale there
 ATTEMPTS = 5  # each with knots at half the distance
 # A unit of misfit in rate, acceleration and snap weighs as much as these in value [s, s^2, s^4].
 RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 5e-9
@@ -103,7 +104,7 @@ def fitted(
             ]
         )
         if apart.max() <= tolerance:
-            return [_polynomials(spline) for spline in found]
+            return [of_spline(spline) for spline in found]
         step /= 2.0
     worst, row = np.unravel_index(np.argmax(apart), apart.shape)
     raise Misfit(int(worst), int(row), float(apart.max()))
@@ -135,50 +136,23 @@ def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSplin
         right.append(np.zeros((len(ends), size)))
     matrix, target = vstack(rows).tocsc(), np.concatenate(right)
     if np.diff(times).max() > LONG_GAP:
-        return BSpline(knots, _solved_by_qr(matrix.tocsr(), target), DEGREE)
+        return BSpline(knots, least_squares(matrix, target), DEGREE)
     solution = spsolve((matrix.T @ matrix).tocsc(), matrix.T @ target)
     return BSpline(knots, solution.reshape(-1, size), DEGREE)
 
 
-def _solved_by_qr(matrix: csr_matrix, target: np.ndarray) -> np.ndarray:
-    """Return the least-squares solution (n, k) by QR of the band.
+def least_squares(matrix: csc_matrix, target: np.ndarray) -> np.ndarray:
+    """Return the least-squares solution (n, k) of rows (m, n), target (m, k).
 
-    The normal equations square the ratio of the weights; this does not.
+    With the residuals as unknowns: the normal equations square the ratio of the weights.
     """
-    matrix.sum_duplicates()  # sorts the columns, too
-    filled = np.flatnonzero(np.diff(matrix.indptr))
-    first = matrix.indices[matrix.indptr[filled]]
-    order = np.argsort(first, kind="stable")
-    counts = np.diff(matrix.indptr)[filled]
-    band = np.zeros((len(filled), DEGREE + 1))
-    band[np.repeat(np.arange(len(filled)), counts), matrix.indices - np.repeat(first, counts)] = (
-        matrix.data
-    )
-    first, band = first[order], band[order]
-    return _band_solved(first, band, target[filled[order]], matrix.shape[1])
+    from scipy.sparse import bmat, identity
+    from scipy.sparse.linalg import spsolve
 
-
-def _band_solved(first: np.ndarray, band: np.ndarray, target: np.ndarray, n: int) -> np.ndarray:
-    """Return the least-squares solution (n, k) of rows (m, w) that begin at columns first (m,).
-
-    first must not decrease; target (m, k).
-    """
-    width, size = band.shape[1], target.shape[1]
-    upper, right = np.zeros((n, width)), np.zeros((n, size))
-    given = np.hstack([band, target])
-    starts = np.searchsorted(first, np.arange(n + 1))
-    open_rows = np.zeros((0, width + size))  # triangular, of the columns from j on
-    for j in range(n):
-        together = np.vstack([open_rows, given[starts[j] : starts[j + 1]]])
-        triangle = np.linalg.qr(together, mode="r")[:width]
-        upper[j], right[j] = triangle[0, :width], triangle[0, width:]
-        open_rows = np.zeros((len(triangle) - 1, width + size))
-        open_rows[:, : width - 1] = triangle[1:, 1:width]
-        open_rows[:, width:] = triangle[1:, width:]
-    for j in range(n - 1, -1, -1):
-        inner = min(width, n - j)
-        right[j] = (right[j] - upper[j, 1:inner] @ right[j + 1 : j + inner]) / upper[j, 0]
-    return right
+    rows, columns = matrix.shape
+    both = bmat([[RESIDUALS * identity(rows), matrix], [matrix.T, None]]).tocsc()
+    filled = np.vstack([target, np.zeros((columns, target.shape[1]))])
+    return spsolve(both, filled).reshape(len(filled), -1)[rows:]
 
 
 def _basis(times: np.ndarray, knots: np.ndarray, order: int) -> csc_matrix:
@@ -197,7 +171,8 @@ def _basis(times: np.ndarray, knots: np.ndarray, order: int) -> csc_matrix:
     return basis if change is None else basis @ change
 
 
-def _polynomials(spline: BSpline) -> Polynomials:
+def of_spline(spline: BSpline) -> Polynomials:
+    """Return a spline of degree DEGREE as polynomials."""
     knots = spline.t[DEGREE:-DEGREE]
     width, powers, scale = np.diff(knots)[:, None], [], 1.0
     for order in range(DEGREE + 1):

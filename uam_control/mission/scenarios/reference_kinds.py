@@ -1,8 +1,8 @@
 """The entry `trajectory` of a scenario file: closed curves, or minimum snap through waypoints.
 
 For given times the curve of least integral of the squared snap consists of polynomials of degree 7,
-with derivatives up to the sixth continuous at the inner points (Mellinger and Kumar 2011). These
-are as many linear equations as unknowns.
+with derivatives up to the sixth continuous at the inner points (Mellinger and Kumar 2011): a spline
+whose rate, acceleration and jerk are zero at both ends.
 """
 
 import math
@@ -14,6 +14,7 @@ from uam_control.coordinates import ALPHA, ARM, CHI_DOT, POSITION, YAW, Z, arm_c
 from uam_control.mission.motion.polynomials import Polynomials
 from uam_control.mission.scenarios import curves
 from uam_control.mission.scenarios.curves import Harmonic
+from uam_control.mission.scenarios.fitted_spline import DEGREE, of_spline
 from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY, Leg
 from uam_control.mission.scenarios.scenario import check_length
 from uam_control.settings.section import Section
@@ -30,10 +31,8 @@ SHAPES = {"circle": ("radius",), "ellipse": ("size",), "lemniscate": ("size",)}
 WAYPOINT_KEYS = ("kind", "points", "times", "speed", "duration", "laps", "yaw_deg", "arm_deg", "at")
 KINDS = (*SHAPES, "waypoints")
 MOST = 10_000  # laps, points of all laps, cycles of a joint in all: what memory is made for
-ORDER = 8  # coefficients of a polynomial
-CONTINUOUS = range(1, ORDER - 1)  # derivatives that are continuous at an inner point
 END_SHARE = 2.0  # the mean speed from rest is half of the speed reached
-AT_REST = range(1, ORDER // 2)  # derivatives that are zero at both ends
+AT_REST = 1, 2, 3  # derivatives that are zero at both ends
 
 
 @dataclass(frozen=True)
@@ -235,41 +234,10 @@ def _timed(entry: Section, values: np.ndarray) -> Polynomials:
 
 def minimum_snap(times: np.ndarray, points: np.ndarray) -> Polynomials:
     """Return the curve through points (m, n) at times (m,) [s], increasing, m at least 2."""
-    widths, count = np.diff(times), len(times) - 1
-    begin, end = _derivatives(0.0), _derivatives(1.0)
-    matrix = np.zeros((ORDER * count, ORDER * count))
-    right = np.zeros((ORDER * count, points.shape[1]))
-    row = 0
+    from scipy.interpolate import make_interp_spline  # takes most of a second
 
-    def equation(terms: list[tuple[int, np.ndarray]], value: np.ndarray | float = 0.0) -> None:
-        nonlocal row
-        for piece, weights in terms:
-            matrix[row, ORDER * piece : ORDER * (piece + 1)] += weights
-        right[row] = value
-        row += 1
-
-    for k in range(count):
-        equation([(k, begin[0])], points[k])
-        equation([(k, end[0])], points[k + 1])
-    for k in range(count - 1):
-        ratio = widths[k] / widths[k + 1]
-        for r in CONTINUOUS:  # scaled by the width of the first of the two
-            equation([(k, end[r]), (k + 1, -begin[r] * ratio**r)])
-    for r in AT_REST:
-        equation([(0, begin[r])])
-        equation([(count - 1, end[r])])
-    powers = np.linalg.solve(matrix, right)
-    return Polynomials(times, powers.reshape(count, ORDER, -1))
-
-
-def _derivatives(u: float) -> np.ndarray:
-    """Return derivative r of u^j, (ORDER, ORDER)."""
-    return np.array(
-        [
-            [math.perm(j, r) * u ** (j - r) if j >= r else 0.0 for j in range(ORDER)]
-            for r in range(ORDER)
-        ]
-    )
+    at_rest = [(order, np.zeros(points.shape[1])) for order in AT_REST]
+    return of_spline(make_interp_spline(times, points, DEGREE, bc_type=(at_rest, at_rest)))
 
 
 def shares(points: np.ndarray) -> np.ndarray:
