@@ -74,11 +74,11 @@ def test_motors_go_off_on_the_ground_alone():
 
 
 def test_every_check_has_a_value():
-    values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
-    measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), np.ones((2, 2)), values)
+    values, seen, nothing = np.full(len(CHECKS), np.nan), observation(), Readings().arrays
+    limited = Checks(S500).arrays._replace(values=values)
+    measure(limited, seen.state, seen.reference, 0.0, nothing)
     assert np.isnan(values).sum() == 16
-    nothing = Readings()
-    read(nothing.values, nothing.joint_effort, nothing.gains, two, three, values)
+    read(limited, nothing)
     assert np.flatnonzero(np.isnan(values)).tolist() == [
         LATE,
         LATE_LOOP,

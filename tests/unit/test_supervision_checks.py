@@ -15,6 +15,7 @@ from uam_control.supervision.checks import (
     LATE_FOR_REFERENCE,
     LATE_LOOP,
     STILL,
+    CheckArrays,
     Checks,
     measure,
     read,
@@ -25,13 +26,20 @@ A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)  # of the 3-4-5 triangle
 BOX = np.array([[-5.0, -6.0, 0.0], [5.0, 6.0, 4.0]])
 
 
+def limited(values, joints=None, efforts=(), gains=(1.0, 1.0, 1.0)):
+    """Arrays of checks with these values and limits."""
+    none, joints = np.zeros(0), np.zeros((2, 0)) if joints is None else joints
+    return CheckArrays(none, BOX, np.array(gains), joints, np.array(efforts), values, none, none)
+
+
 def measured(state, reference=None, mocap=(math.nan,) * 3, age=math.nan, ground=0.0, joints=None):
     """What `measure` writes into the first eight values; those behind stay."""
     values = np.full(len(CHECKS), 77.0)
     reference = np.zeros(state.shape) if reference is None else reference
     limits = np.ones(state.shape[1] - 6) if joints is None else np.array(joints)
     limits = np.stack([limits, 0.0 * limits]) if limits.ndim == 1 else limits
-    measure(state, reference, np.array(mocap), age, ground, BOX, limits, values)
+    readings = Readings(mocap_position=np.array(mocap), mocap_age=age)
+    measure(limited(values, limits), state, reference, ground, readings.arrays)
     np.testing.assert_array_equal(values[9:], 77.0)
     return values[:9]
 
@@ -108,8 +116,8 @@ def test_readings_have_their_places():
         contradiction=19.0, slower=20.0,
         joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
-    limits = np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25])
-    read(readings.values, readings.joint_effort, readings.gains, *limits, values)
+    limits = limited(values, efforts=[2.0, 4.0, 8.0], gains=[2.0, 1.0, 0.25])
+    read(limits, readings.arrays)
     np.testing.assert_array_equal(values[:9], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
@@ -120,11 +128,7 @@ def test_readings_have_their_places():
 def test_what_is_unknown_is_below_every_limit():
     values = np.zeros(len(CHECKS))
     values[[LATE, LATE_LOOP, LATE_FOR_REFERENCE, STILL]] = -math.inf  # by `Checks.update`
-    nothing = Readings()
-    read(
-        *(nothing.values, nothing.joint_effort, nothing.gains),
-        *(np.ones(2), np.ones(3), values),
-    )
+    read(limited(values, efforts=[1.0, 1.0]), Readings().arrays)
     np.testing.assert_array_equal(values[9:], -math.inf)
 
 

@@ -96,6 +96,7 @@ def calling(function: Callable, read: Callable[[int], Any], count: int) -> Calla
         lambda address, a, b: function(read(address), a, b),
         lambda address, a, b, c: function(read(address), a, b, c),
         lambda address, a, b, c, d: function(read(address), a, b, c, d),
+        lambda address, a, b, c, d, e: function(read(address), a, b, c, d, e),
     )
     return compiled.borrowing(calls[count])
 

@@ -19,7 +19,8 @@ import numpy as np
 from uam_control.ages import FORWARDED, usable
 from uam_control.arm.still_joint import SOON, stands, still_joints
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, YAW, X, Z
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Number, record
 from uam_control.maths.rotations import tilt, wrapped
 from uam_control.supervision.monitor import Level, Monitor
@@ -129,7 +130,6 @@ LATE, LATE_LOOP, LATE_FOR_REFERENCE, EFFORT, GAIN, STILL = (
 BLIND = frozenset(check.name for check in CHECKS if check.blind)
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
 _SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
-_CHECKED = len(CHECKS)
 _READ = tuple(NUMBERS.index(CHECKS[i].reading) for i in _ROWS)  # places of their readings
 _MOCAP_AGE, _ROUND_TRIP, _LOOP_DELAY = map(NUMBERS.index, ("mocap_age", "round_trip", "loop_delay"))
 
@@ -151,13 +151,17 @@ class ExceededLimit(NamedTuple):
 
 
 class CheckArrays(NamedTuple):
-    """bounds: all limits in one array. Of every quantity the lowest limit, below which no monitor
-    changes while all are quiet; low and high corner (3,) of the box [m]; gains (3,) of position,
-    attitude, arm; `joints` angles [rad] and their middle; torques [N m]. values: of CHECKS; still
-    (joints,): of `stands`; numbers (1,): joints, setpoint_delay [s] of `Checks`, delay_nominal [s]
-    and share of the parameters."""
+    """lowest (k,): of every quantity the lowest limit, below which no monitor changes while all are
+    quiet; box (2, 3) [m]: low and high corner; gains (3,): limits of position, attitude, arm;
+    joints (2, n): limits of the angles [rad] to either side of their middle, and the middle;
+    efforts (n,): limits [N m]. values (k,): of CHECKS; still (n,): of `stands`; numbers (1,):
+    setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the parameters."""
 
-    bounds: np.ndarray
+    lowest: np.ndarray
+    box: np.ndarray
+    gains: np.ndarray
+    joints: np.ndarray
+    efforts: np.ndarray
     values: np.ndarray
     still: np.ndarray
     numbers: np.ndarray
@@ -179,12 +183,10 @@ class Checks:
         self._values = np.zeros(len(CHECKS))
         self._still = still_joints(len(parameters.joint_angle_hold))
         self.finding: ExceededLimit | None = None
-        self.memory = record("joints", "setpoint_delay delay_nominal share")
+        self.memory = record("", "setpoint_delay delay_nominal share")
         self.setpoint_delay = math.nan
         self._stands = math.inf
         self.configure(parameters)
-        rows, readings = np.zeros((3, ALPHA)), Readings().arrays
-        self._measure = prepared(measure_all, self.arrays, rows, rows, 0.0, readings, True)
 
     def configure(self, parameters: SupervisionParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
@@ -197,12 +199,15 @@ class Checks:
             (p.hold_after, getattr(p, check.land_after), getattr(p, check.failsafe_after))
             for check in CHECKS
         )
-        first = [min(limits) for limits in self._limits]
-        parts = first, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
-        parts += np.zeros(len(p.joint_angle_hold)) + p.joint_angle_middle, p.joint_effort_hold
-        bounds = np.concatenate([np.array(part) for part in parts])
-        self.arrays = CheckArrays(bounds.astype(float), self._values, self._still, self.memory)
-        self.memory["joints"] = len(p.joint_angle_hold)
+        angles = np.array(p.joint_angle_hold, dtype=float)
+        angles = np.stack([angles, np.zeros(len(angles)) + p.joint_angle_middle])
+        lowest, box = [min(limits) for limits in self._limits], (p.geofence_low, p.geofence_high)
+        limits = (np.array(one, float) for one in (lowest, box, p.gain_hold))
+        self.arrays = CheckArrays(
+            *limits, angles, np.array(p.joint_effort_hold), self._values, self._still, self.memory
+        )
+        rows = np.zeros((3, ALPHA))
+        self._measure = bound(measure_all, self.arrays, rows, rows, 0.0, Readings().arrays, True)
         self.memory["delay_nominal"] = p.delay_nominal
         self.memory["share"] = p.delay_share_of_round_trip
 
@@ -227,9 +232,7 @@ class Checks:
         in_flight: whether the vehicle follows the reference.
         """
         readings = seen.readings.arrays
-        calm = self._measure(
-            self.arrays, seen.state, seen.reference, seen.ground, readings, in_flight
-        )
+        calm = self._measure(seen.state, seen.reference, seen.ground, readings, in_flight)
         if calm and self.quiet:
             return None
         p, worst = self._parameters, None
@@ -273,47 +276,31 @@ def measure_all(
     state, reference (3, 6 + n); ground [m]: height at take-off; in_flight: whether the vehicle
     follows the reference.
     """
-    m, bounds, values = a.numbers[0], a.bounds, a.values
-    box, gain = _CHECKED, _CHECKED + 6
-    angle = gain + 3
-    effort = angle + 2 * m.joints
-    known = readings.values
-    corners, age = bounds[box:gain].reshape((2, 3)), known[_MOCAP_AGE]
-    ranges = bounds[angle:effort].reshape((2, m.joints))
-    measure(state, reference, readings.position, age, ground, corners, ranges, values)
-    read(known, readings.effort, readings.gains, bounds[effort:], bounds[gain:angle], values)
+    m, values, known = a.numbers[0], a.values, readings.values
+    measure(a, state, reference, ground, readings)
+    read(a, readings)
     values[STILL] = 0.0
     for i in range(min(state.shape[1] - ALPHA, len(readings.effort), len(a.still))):
         own = state[CHI, ALPHA + i] if in_flight else math.nan
         wanted, torque = reference[CHI, ALPHA + i], readings.effort[i]
-        if stands(a.still, i, own, wanted, torque, 0.0, bounds[effort + i], SOON):
+        if stands(a.still, i, own, wanted, torque, 0.0, a.efforts[i], SOON):
             values[STILL] = 1.0
     link = by_link(known[_ROUND_TRIP], m.share, in_flight)
     loop = by_loop(known[_LOOP_DELAY], m.delay_nominal, in_flight)
     m.setpoint_delay = larger(link, loop)
     values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
     values[LATE_FOR_REFERENCE] = max(values[LATE], values[LATE_LOOP])
-    return _below(values, bounds[:box])
+    return _below(values, a.lowest)
 
 
 @borrowing
 def measure(
-    state: np.ndarray,
-    reference: np.ndarray,
-    mocap: np.ndarray,
-    age: float,
-    ground: float,
-    box: np.ndarray,
-    joints: np.ndarray,
-    values: np.ndarray,
+    a: CheckArrays, state: np.ndarray, reference: np.ndarray, ground: float, readings: ReadingArrays
 ) -> None:
     """Write the quantities of state and reference into values[:9]; of a state that is not finite
-    only values[0].
-
-    mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
-    and high corner [m]; joints (2, n): limits of the angles [rad] to either side of
-    their middle, and the middle.
-    """
+    only values[0]."""
+    box, joints, values = a.box, a.joints, a.values
+    mocap, age = readings.position, readings.values[_MOCAP_AGE]
     values[0] = 0.0
     for i in range(3):
         for j in range(state.shape[1]):
@@ -340,23 +327,12 @@ def measure(
 
 
 @borrowing
-def read(
-    readings: np.ndarray,
-    efforts: np.ndarray,
-    gains: np.ndarray,
-    effort_limits: np.ndarray,
-    gain_limits: np.ndarray,
-    values: np.ndarray,
-) -> None:
-    """Write the readings into values[9:].
-
-    readings: values of `Readings`; efforts (n,): of the joints [N m], gains (3,): of position,
-    attitude, arm, with their limits.
-    """
+def read(a: CheckArrays, readings: ReadingArrays) -> None:
+    """Write the readings into values[9:]."""
     for i in range(len(_ROWS)):
-        values[_ROWS[i]] = _known(readings[_READ[i]] * _SIGNS[i])
-    values[EFFORT] = _largest(efforts, effort_limits)
-    values[GAIN] = _largest(gains, gain_limits)
+        a.values[_ROWS[i]] = _known(readings.values[_READ[i]] * _SIGNS[i])
+    a.values[EFFORT] = _largest(readings.effort, a.efforts)
+    a.values[GAIN] = _largest(readings.gains, a.gains)
 
 
 @borrowing
