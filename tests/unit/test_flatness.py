@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.mission.motion.flatness import write_attitude
+from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.polynomials import Polynomials
 
 NO_DRAG, G, FREE = np.zeros(3), 9.81, 1e6
@@ -16,7 +16,7 @@ COEFFICIENT = st.floats(-2.0, 2.0)
 
 def attitude(motion, drag=NO_DRAG, rate_max=FREE, acceleration_max=FREE):
     reference = np.zeros((3, 8))
-    write_attitude(motion, np.array(drag), G, rate_max, acceleration_max, reference)
+    write_reference(motion, np.array(drag), G, rate_max, acceleration_max, reference)
     return reference[:, 3:5]
 
 

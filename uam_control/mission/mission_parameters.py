@@ -141,7 +141,7 @@ class FeasibilityLimits(ParameterSet):
 
 @dataclass(frozen=True)
 class FlatnessParameters(ParameterSet):
-    """What the attitude of the reference depends on, see `flatness.write_attitude`."""
+    """What the attitude of the reference depends on, see `flatness.write_reference`."""
 
     gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.1, 30.0)
     drag: tuple = vector(

@@ -21,7 +21,7 @@ from uam_control.maths.memory import Flag, Number, put, record
 from uam_control.offboard.modes import Mode
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence, Phase
 from uam_control.setpoints.level_hold import HoldParameters, follow_thrust
-from uam_control.setpoints.loop_delay import DelayNumbers, pause
+from uam_control.setpoints.loop_delay import pause
 from uam_control.setpoints.rate_thrust_map import (
     RateThrustMap,
     RateThrustParameters,
@@ -91,7 +91,6 @@ class BridgeArrays(NamedTuple):
     rates: np.ndarray
     curve: tuple[float, float, float, float]
     measured: MeasurementArrays
-    delay_numbers: DelayNumbers
     vision: VisionArrays
     hold: np.ndarray
     sequence: np.ndarray
@@ -271,7 +270,7 @@ class BridgeStage:
         measured, source, mapping = self.measurements, self.source, self.map
         return BridgeArrays(
             *(mapping.memory, mapping.flat, mapping.rates, mapping.curve),
-            *(measured.arrays, self.loop_delay.numbers, self.vision.arrays),
+            *(measured.arrays, self.vision.arrays),
             *(source.hold.memory, self.sequence.memory, self.reports.memory),
             *(self.memory, self.sent),
         )
@@ -341,7 +340,7 @@ def sending(port: PortSteps) -> Callable[[tuple], int]:
         m.factor = factor = a.map[0].factor
         step = min(max(stamp - m.last, 0) / SECOND, LONGEST_STEP)
         sent = Sent(rates, thrust, True, True, factor)
-        found = measure(now, step, s.state, sent, a.curve, a.measured, a.delay_numbers)
+        found = measure(a.measured, now, step, s.state, sent, a.curve)
         if found != factor:
             use_factor(a.map, a.flat, found)
         if stamp // LIFT_PERIOD != m.last // LIFT_PERIOD:

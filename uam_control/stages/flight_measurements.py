@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI_DOT, ROLL
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
 from uam_control.setpoints.loop_delay import DelayNumbers, DelaySums, LoopDelay, follow, pause
 from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.setpoints.thrust_identification import (
@@ -20,16 +21,18 @@ from uam_control.setpoints.thrust_identification import (
 from uam_control.vehicle import VehicleDescription
 
 LIFT_CUTOFF = 1.0  # [Hz]
+Curve = tuple[float, float, float, float]  # see `RateThrustMap.curve`
 
 
 class MeasurementArrays(NamedTuple):
     """State of the measurements.
 
-    sums: of the loop delay; record, memory: of the thrust identification, both structured (1,);
-    lift (2,): low-passes of the collective [N] and of the normalised thrust.
+    sums, delay: of the loop delay; record, memory: of the thrust identification, both structured
+    (1,); lift (2,): low-passes of the collective [N] and of the normalised thrust.
     """
 
     sums: DelaySums
+    delay: DelayNumbers
     record: np.ndarray
     memory: np.ndarray
     lift: np.ndarray
@@ -51,23 +54,16 @@ class Sent(NamedTuple):
 
 @borrowing
 def measure(
-    now: float,
-    step: float,
-    state: np.ndarray,
-    sent: Sent,
-    curve: tuple[float, float, float, float],
-    arrays: MeasurementArrays,
-    numbers: DelayNumbers,
+    a: MeasurementArrays, now: float, step: float, state: np.ndarray, sent: Sent, curve: Curve
 ) -> float:
     """Advance the measurements by one tick; return the new thrust factor.
 
-    now [s]; step [s]: since the last tick, for the low-passes; state (3, 6 + n); curve: see
-    `RateThrustMap.curve`; numbers: of the loop delay.
+    now [s]; step [s]: since the last tick, for the low-passes; state (3, 6 + n).
     """
-    sums, record, memory, lift = arrays
+    sums, delay, record, memory, lift = a
     thrust = sent.thrust
     if sent.looped:
-        follow(now, sent.rates, state[CHI_DOT, ROLL:ALPHA], sums, numbers)
+        follow(now, sent.rates, state[CHI_DOT, ROLL:ALPHA], sums, delay)
     else:
         pause(sums)
     assumed = thrust_of_command(thrust, curve[0], curve[1], curve[2], curve[3])
@@ -89,21 +85,13 @@ class FlightMeasurements:
         self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
         self.lift = np.zeros(2)
         memory = self.identification.record, self.identification.memory
-        self.arrays = MeasurementArrays(self.loop_delay.sums, *memory, self.lift)
-        self._measure = prepared(
-            *(measure, 0.0, 0.0, np.zeros((3, ALPHA)), Sent(np.zeros(3), 0.0, True, True, 1.0)),
-            *((0.0, 0.0, 0.0, 0.0), self.arrays, self.loop_delay.numbers),
-        )
+        delay = self.loop_delay.sums, self.loop_delay.numbers
+        self.arrays = MeasurementArrays(*delay, *memory, self.lift)
+        tick = 0.0, 0.0, np.zeros((3, ALPHA)), Sent(np.zeros(3), 0.0, True, True, 1.0), 4 * (0.0,)
+        self._measure = bound(measure, self.arrays, *tick)
 
-    def update(
-        self,
-        now: float,
-        step: float,
-        state: np.ndarray,
-        sent: Sent,
-        curve: tuple[float, float, float, float],
-    ) -> float:
+    def update(self, now: float, step: float, state: np.ndarray, sent: Sent, curve: Curve) -> float:
         """Take a tick and return the new thrust factor; see `measure`."""
         if self.identification.magnet_waits:
             self.identification.follow_magnet(now, math.isfinite(now + sent.thrust))
-        return self._measure(now, step, state, sent, curve, self.arrays, self.loop_delay.numbers)
+        return self._measure(now, step, state, sent, curve)

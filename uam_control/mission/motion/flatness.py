@@ -43,32 +43,16 @@ def write_reference(
     acceleration_max: float,
     reference: np.ndarray,
 ) -> None:
-    """Write the motion (5, 6 + n) with its attitude into reference (3, 6 + n).
+    """Write the motion, with roll, pitch and their two derivatives, into reference (3, 6 + n).
 
-    The other arguments: see `write_attitude`.
+    motion (5, 6 + n): see `coordinates`; drag (3,): linear drag per mass along the world axes
+    [1/s]; gravity [m/s^2]; rate_max [rad/s] and acceleration_max [rad/s^2] bound the derivatives
+    of motions with steps in acceleration or jerk. The angles are Euler angles of the body (Z-Y-X)
+    [rad].
     """
     for row in range(reference.shape[0]):
         for i in range(reference.shape[1]):
             reference[row, i] = motion[row, i]
-    write_attitude(motion, drag, gravity, rate_max, acceleration_max, reference)
-
-
-@jit
-def write_attitude(
-    motion: np.ndarray,
-    drag: np.ndarray,
-    gravity: float,
-    rate_max: float,
-    acceleration_max: float,
-    reference: np.ndarray,
-) -> None:
-    """Write roll and pitch with first and second derivative into those columns of reference.
-
-    motion (5, 6 + n): see `coordinates`; drag (3,): linear drag per mass along the world axes
-    [1/s]; gravity [m/s^2]; rate_max [rad/s] and acceleration_max [rad/s^2] bound the derivatives
-    of motions with steps in acceleration or jerk. reference (3, 6 + n): Euler angles of the body
-    (Z-Y-X) [rad], their derivatives [rad/s], [rad/s^2].
-    """
     # f / m and its derivatives
     f, f_dot, f_ddot = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
