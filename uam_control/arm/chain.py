@@ -42,35 +42,29 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of a symmetric matri
 class Chain(NamedTuple):
     """An arm of n joints; frames parallel to the base's with every joint at zero.
 
-    offsets (n, 3) [m]: of a joint from the one before, the first from the base's origin; axes
-    (n, 3): unit vectors; masses (n,) [kg], centres (n, 3) [m] and inertias (n, 3, 3) [kg m^2] about
-    them, of the links, from their joints; armature [kg m^2], damping [N m s/rad], friction [N m]:
-    (n,). base_mass, base_centre (3,), base_inertia (3, 3) about it: what no joint turns.
-
-    The end effector, if has_hand is 1: hand_place (3,) [m] in the last link, hand_turn (3, 3): its
-    axes at zero. One that hangs on a passive hinge there has swing_axis (3,), zeros otherwise;
-    swing_reach (3,) [m]: from the hinge to it; swing_mass, swing_centre (3,): of what hangs. This
-    mass is counted in the last link, at the hinge: what swings freely carries no moment.
+    Links from their joints; what no joint turns is the base. An end effector may hang on a passive
+    hinge in the last link. The mass there is counted in the last link, at the hinge: what swings
+    freely carries no moment.
     """
 
-    offsets: np.ndarray
-    axes: np.ndarray
-    masses: np.ndarray
-    centres: np.ndarray
-    inertias: np.ndarray
-    armature: np.ndarray
-    damping: np.ndarray
-    friction: np.ndarray
+    offsets: np.ndarray  # (n, 3) [m] of a joint from the one before, the first from the origin
+    axes: np.ndarray  # (n, 3) unit vectors
+    masses: np.ndarray  # (n,) [kg] of the links
+    centres: np.ndarray  # (n, 3) [m] of the links, from their joints
+    inertias: np.ndarray  # (n, 3, 3) [kg m^2] of the links about their centres
+    armature: np.ndarray  # (n,) [kg m^2]
+    damping: np.ndarray  # (n,) [N m s/rad]
+    friction: np.ndarray  # (n,) [N m]
     base_mass: float
-    base_centre: np.ndarray
-    base_inertia: np.ndarray
-    has_hand: int
-    hand_place: np.ndarray
-    hand_turn: np.ndarray
-    swing_axis: np.ndarray
-    swing_reach: np.ndarray
-    swing_mass: float
-    swing_centre: np.ndarray
+    base_centre: np.ndarray  # (3,)
+    base_inertia: np.ndarray  # (3, 3) about its centre
+    has_hand: int  # 1: there is an end effector
+    hand_place: np.ndarray  # (3,) [m] in the last link
+    hand_turn: np.ndarray  # (3, 3) its axes at zero
+    swing_axis: np.ndarray  # (3,) of the hinge; zeros: it is fixed
+    swing_reach: np.ndarray  # (3,) [m] from the hinge to the end effector
+    swing_mass: float  # of what hangs
+    swing_centre: np.ndarray  # (3,) of what hangs
 
 
 def _many(what: str, unit: str, low: float, high: float) -> Any:

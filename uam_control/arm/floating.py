@@ -44,15 +44,14 @@ TASK = 4  # place of the hand from the centre of mass [m, world], and its headin
 
 
 class Decoupled(NamedTuple):
-    """Of a posture, in the base's frame: mass [kg], centre [m]; first (3, n): d centre / d alpha;
-    M_r (3, 3), M_rho (n, n), N (n, 3): see the module."""
+    """Inertia of a posture, in the base's frame; see the module."""
 
-    mass: float
-    centre: Vector
-    first: np.ndarray
-    turning: np.ndarray
-    joints: np.ndarray
-    coupling: np.ndarray
+    mass: float  # [kg]
+    centre: Vector  # [m]
+    first: np.ndarray  # (3, n) d centre / d alpha
+    turning: np.ndarray  # (3, 3) M_r
+    joints: np.ndarray  # (n, n) M_rho
+    coupling: np.ndarray  # (n, 3) N
 
 
 def stiff(chain: Chain) -> Chain:

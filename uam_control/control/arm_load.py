@@ -57,16 +57,15 @@ class ArmLoadParameters(ChainParameters):
 
 
 class ArmLoad(NamedTuple):
-    """share (n,): friction per torque; gravity [m/s^2]; on: whether the load is fed forward;
-    torques (n,) [N m]: of the joints; motion, links: memory of `newton_euler`."""
+    """What `arm_load` uses."""
 
     chain: Chain
-    share: np.ndarray
-    gravity: float
-    on: bool
-    torques: np.ndarray
-    motion: np.ndarray
-    links: np.ndarray
+    share: np.ndarray  # (n,) friction per torque
+    gravity: float  # [m/s^2]
+    on: bool  # whether the load is fed forward
+    torques: np.ndarray  # (n,) [N m] of the joints
+    motion: np.ndarray  # memory of `newton_euler`
+    links: np.ndarray  # the same
 
 
 @borrowing

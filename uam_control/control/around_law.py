@@ -41,12 +41,11 @@ WHOLE, REAL = "saturated flying printed frozen", "time"
 
 
 class RotorLead(NamedTuple):
-    """lag, response [s]: see above; no lead for a response of 0. made (1,) [N]: upward part of f,
-    NaN at first: then it is u."""
+    """See above."""
 
-    lag: float
-    response: float
-    made: np.ndarray
+    lag: float  # [s]
+    response: float  # [s]; 0: no lead
+    made: np.ndarray  # (1,) [N] upward part of f, NaN at first: then it is u
 
 
 @borrowing
@@ -70,32 +69,28 @@ def lead_force(lead: RotorLead, least: float, largest: float, dt: float, tau: np
 
 
 class ControllerArrays(NamedTuple):
-    """Of every controller, the same for all laws. found (m,): tau of the law; errors (3, 6 + n),
-    see `tracking_errors`, own: their rows of the subsystem; norms (3,); tau (m,): limited output;
-    numbers (1,): see WHOLE, REAL."""
+    """Of every controller, the same for all laws."""
 
-    found: np.ndarray
-    errors: np.ndarray
-    own: tuple[np.ndarray, np.ndarray, np.ndarray]
-    norms: np.ndarray
-    tau: np.ndarray
-    numbers: np.ndarray
+    found: np.ndarray  # (m,) tau of the law
+    errors: np.ndarray  # (3, 6 + n) see `tracking_errors`
+    own: tuple[np.ndarray, np.ndarray, np.ndarray]  # rows of the subsystem in them
+    norms: np.ndarray  # (3,)
+    tau: np.ndarray  # (m,) limited output
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 class PositionArrays(NamedTuple):
-    """Of the `PositionController`. carried [m/s^2]: bias (3,) of the law, integral (3,) of
-    integral_gain e; rotors: lead for their lag; turning: whether the bias turns with the heading;
-    filter, lead, attitude: see `attitude_reference_step`."""
+    """Of the `PositionController`."""
 
     all: ControllerArrays
     completion: ForceCompletion
-    carried: tuple[np.ndarray, np.ndarray]
-    rotors: RotorLead
-    turning: bool
+    carried: tuple[np.ndarray, np.ndarray]  # [m/s^2] bias (3,) of the law, integral (3,)
+    rotors: RotorLead  # lead for their lag
+    turning: bool  # whether the bias turns with the heading
     cutoff: float
-    filter: np.ndarray
-    lead: np.ndarray
-    attitude: np.ndarray
+    filter: np.ndarray  # see `attitude_reference_step`
+    lead: np.ndarray  # the same
+    attitude: np.ndarray  # the same
 
 
 # [s] loop delay, time ahead for which the errors are predicted; the others: parameters
@@ -103,41 +98,36 @@ PREDICTION = "measured ahead prediction nominal"
 
 
 class AttitudeArrays(NamedTuple):
-    """Of the `AttitudeController`. load, turn (3,) [rad/s^2]: its moment per inertia (3,)
-    [kg m^2]; washout, slow (3,): see `wash_out`; rates: number in RATE_REFERENCES;
-    measured: whether the load is that of the measured angles; prediction (1,): see PREDICTION, and
-    whether the delay counts."""
+    """Of the `AttitudeController`."""
 
     all: ControllerArrays
     load: ArmLoad
-    turn: np.ndarray
-    inertia: np.ndarray
-    washout: np.ndarray
-    slow: np.ndarray
-    rates: int
-    measured: bool
+    turn: np.ndarray  # (3,) [rad/s^2] moment of the load per inertia
+    inertia: np.ndarray  # (3,) [kg m^2]
+    washout: np.ndarray  # see `wash_out`
+    slow: np.ndarray  # (3,) see `wash_out`
+    rates: int  # number in RATE_REFERENCES
+    measured: bool  # whether the load is that of the measured angles
     torque_max: np.ndarray
-    prediction: np.ndarray
+    prediction: np.ndarray  # (1,) PREDICTION, and whether the delay counts
 
 
 class ArmArrays(NamedTuple):
-    """Of the `ArmController`. inertia, gain, limit, integral: see `complete_effort`. command (n,):
-    is given goals if `goals`, of reference or state, plus compliance [rad/(N m)] tau; hold (1,):
-    when, see `is_new`; still (n,): see `let_go`."""
+    """Of the `ArmController`."""
 
     all: ControllerArrays
     load: ArmLoad
-    inertia: np.ndarray
+    inertia: np.ndarray  # (n,) see `complete_effort`, as the next three
     gain: np.ndarray
     limit: float
     integral: np.ndarray
     torque_max: np.ndarray
-    command: np.ndarray
+    command: np.ndarray  # (n,) given goals: of reference or state, plus compliance tau
     goals: bool
     of_reference: bool
-    compliance: float
-    hold: np.ndarray
-    still: np.ndarray
+    compliance: float  # [rad/(N m)]
+    hold: np.ndarray  # (1,) when, see `is_new`
+    still: np.ndarray  # (n,) see `let_go`
 
 
 @borrowing

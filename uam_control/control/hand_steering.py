@@ -77,17 +77,15 @@ REAL = " ".join((*HandParameters.specs(), "weight", "period"))
 
 
 class HandArrays(NamedTuple):
-    """chain: of the arm; ranges (2, n) [rad]; correction (2, n): angles [rad] and rates; pose
-    (6 + n,), jacobian (6, n): for the computation; reference (3, 6 + n): of the arm law; numbers
-    (1,): see WHOLE, REAL."""
+    """State of the stabilisation of the hand."""
 
     chain: Chain
-    ranges: np.ndarray
-    correction: np.ndarray
-    pose: np.ndarray
-    jacobian: np.ndarray
-    reference: np.ndarray
-    numbers: np.ndarray
+    ranges: np.ndarray  # (2, n) [rad]
+    correction: np.ndarray  # (2, n) angles [rad] and rates
+    pose: np.ndarray  # (6 + n,) for the computation
+    jacobian: np.ndarray  # (6, n) for the computation
+    reference: np.ndarray  # (3, 6 + n) of the arm law
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 @jit

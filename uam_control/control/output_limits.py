@@ -240,17 +240,13 @@ def integrate(
 
 
 class ForceCompletion(NamedTuple):
-    """What `complete_and_limit` needs besides the tick's values; limits: see `limit_force`.
+    """What `complete_and_limit` needs besides the tick's values; limits: see `limit_force`."""
 
-    drag (3,) [N s/m]; inertia (3,) [kg]; integral_gain, integral_limit: see `integrate`.
-    integral_gravity [m/s^2]: gravity, 0: what is carried does not count as weight.
-    """
-
-    drag: np.ndarray
-    inertia: np.ndarray
-    integral_gain: np.ndarray
-    integral_limit: float
-    integral_gravity: float
+    drag: np.ndarray  # (3,) [N s/m]
+    inertia: np.ndarray  # (3,) [kg]
+    integral_gain: np.ndarray  # see `integrate`
+    integral_limit: float  # see `integrate`
+    integral_gravity: float  # [m/s^2] gravity; 0: what is carried is no weight
     weight: float
     thrust_min: float
     thrust_max: float

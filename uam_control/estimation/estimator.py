@@ -93,14 +93,12 @@ class EstimatorParameters(BaseParameters):
 
 
 class EstimatorArrays(NamedTuple):
-    """State of a `StateEstimator`: of its filter of poses; memory: see `arrays_of`; readings
-    (READINGS, 1 + 2 n): stamp, angles and velocities of those that wait, in order; numbers (1,):
-    see WHOLE, REAL."""
+    """State of a `StateEstimator`."""
 
     pose: FilterArrays
-    memory: np.ndarray
-    readings: np.ndarray
-    numbers: np.ndarray
+    memory: np.ndarray  # see `arrays_of`
+    readings: np.ndarray  # (READINGS, 1 + 2 n) stamp, angles, velocities: they wait, in order
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 # started: whether a pose has come; waiting: number of readings; observed: whether an observer makes

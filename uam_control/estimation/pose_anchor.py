@@ -47,16 +47,14 @@ class PoseSourceParameters(ParameterSet):
 
 
 class AnchorArrays(NamedTuple):
-    """State of a `PoseAnchor`. Places (4,): newest of the odometry, its rates [m/s, rad/s], and
-    offset: from its frame to that of the poses given; raw, given (7,): newest pose before and
-    after; numbers (1,): see WHOLE, REAL."""
+    """State of a `PoseAnchor`."""
 
-    newest: np.ndarray
-    rates: np.ndarray
-    offset: np.ndarray
-    raw: np.ndarray
-    given: np.ndarray
-    numbers: np.ndarray
+    newest: np.ndarray  # (4,) place of the odometry
+    rates: np.ndarray  # (4,) of that [m/s, rad/s]
+    offset: np.ndarray  # (4,) from its frame to that of the poses given
+    raw: np.ndarray  # (7,) newest pose before
+    given: np.ndarray  # (7,) and after
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 # jumps: how many were taken out; stamp [s]: of the newest pose, NaN before the first; distance [m]

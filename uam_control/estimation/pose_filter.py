@@ -45,17 +45,15 @@ TURN, POSE = 3, 7  # a stored pose: position before, quaternion from this index 
 
 
 class EstimatedMotion(NamedTuple):
-    """position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
-    rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
-    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]."""
+    """What a filter estimates."""
 
-    position: np.ndarray
-    velocity: np.ndarray
-    quaternion: np.ndarray
-    rates: np.ndarray
-    acceleration: np.ndarray
-    gyro_bias: np.ndarray
-    accelerometer_bias: np.ndarray
+    position: np.ndarray  # (3,) [m, world]
+    velocity: np.ndarray  # (3,) [m/s, world]
+    quaternion: np.ndarray  # (4,) body → world [w x y z]
+    rates: np.ndarray  # (3,) [rad/s, body] without bias
+    acceleration: np.ndarray  # (3,) [m/s^2, world] without gravity and bias
+    gyro_bias: np.ndarray  # (3,) [rad/s, body]
+    accelerometer_bias: np.ndarray  # (3,) [m/s^2, world]
 
 
 MOTION = 22  # numbers of an `EstimatedMotion`
@@ -89,19 +87,16 @@ def allowed_bandwidth(interval: float) -> float:
 
 
 class FilterArrays(NamedTuple):
-    """State of a filter: memory, see `parts_of`; bandwidths (3,) [rad/s]: of the corrections
-    of position and attitude, and the larger of both; used (2,) [rad/s]: in this correction; ahead
-    (HISTORY, 8): stamp and pose of those that wait for their IMU sample, in order; newest (7,): see
-    `repeated`; clock, gate (1,): of `pose_clock`; numbers (1,): see WHOLE, REAL. all stay."""
+    """State of a filter; all arrays stay."""
 
-    memory: np.ndarray
-    bandwidths: np.ndarray
-    used: np.ndarray
-    ahead: np.ndarray
-    newest: np.ndarray
-    clock: np.ndarray
-    gate: np.ndarray
-    numbers: np.ndarray
+    memory: np.ndarray  # see `parts_of`
+    bandwidths: np.ndarray  # (3,) [rad/s] of position and attitude, the larger of both
+    used: np.ndarray  # (2,) [rad/s] in this correction
+    ahead: np.ndarray  # (HISTORY, 8) stamp and pose: they wait for their IMU sample, in order
+    newest: np.ndarray  # (7,) see `repeated`
+    clock: np.ndarray  # (1,) of `pose_clock`
+    gate: np.ndarray  # (1,) of `pose_clock`
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 # count: of the IMU samples; waiting: number of poses ahead. Stamps [s], NaN before the first:

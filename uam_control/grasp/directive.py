@@ -52,12 +52,10 @@ class Step(Enum):
 
 @dataclass
 class Directive:
-    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: grip before the
-    scenario says so; without_descent: the window whose descent is left out, None for none; land:
-    reason to land, "" for none."""
+    """Output of the executive."""
 
-    pace: float = 1.0
-    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    grip: bool = False
-    without_descent: GraspWindow | None = None
-    land: str = ""
+    pace: float = 1.0  # of the scenario's clock
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m] of its path
+    grip: bool = False  # before the scenario says so
+    without_descent: GraspWindow | None = None  # whose descent is left out
+    land: str = ""  # reason to land

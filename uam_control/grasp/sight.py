@@ -20,35 +20,26 @@ MEMORY = 0.8  # [s] time constant of the means
 
 @dataclass
 class Sight:
-    """What a vehicle can measure for a grasp.
-
-    stamp [s]; time [s]: of the scenario; tool (3,) [m, world]: face, from the estimate; error
-    (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose;
-    tool_then (3,) [m, world]: tool at the stamp of that pose, default: no delay; ahead (3,)
-    [m]: way of the tool on the path from now until the descent begins; lift
-    [N]: filtered collective thrust; throttle: the same as sent, 0..1; effort [N m]: measured torque
-    of the first joint; lever [m]: horizontal distance of the tool from that joint; on_path: whether
-    the vehicle flies on the path, and not on its way back to it. opening [m], squeeze [N]: of
-    fingers. NaN: unknown.
+    """What a vehicle can measure for a grasp; NaN: unknown.
 
     A payload that stands is compared with `tool`, its old pose is still true. One that may hang
     on the tool is compared with `tool_then`.
     """
 
-    stamp: float
-    time: float
-    tool: np.ndarray
-    error: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    payload: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
-    lift: float = math.nan
-    throttle: float = math.nan
-    effort: float = math.nan
-    lever: float = 0.0
-    on_path: bool = True
-    tool_then: np.ndarray | None = None
-    ahead: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    opening: float = math.nan
-    squeeze: float = math.nan
+    stamp: float  # [s]
+    time: float  # [s] of the scenario
+    tool: np.ndarray  # (3,) [m, world] face, from the estimate
+    error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # position - reference
+    payload: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))  # grip point, mocap
+    lift: float = math.nan  # [N] filtered collective thrust
+    throttle: float = math.nan  # the same as sent, 0..1
+    effort: float = math.nan  # [N m] measured torque of the first joint
+    lever: float = 0.0  # [m] horizontal distance of the tool from that joint
+    on_path: bool = True  # whether it flies on the path, and not on its way back to it
+    tool_then: np.ndarray | None = None  # (3,) at the stamp of the payload's pose; None: tool
+    ahead: np.ndarray = field(default_factory=lambda: np.zeros(3))  # way until descent
+    opening: float = math.nan  # [m] of fingers
+    squeeze: float = math.nan  # [N] of fingers
 
     def __post_init__(self) -> None:
         if self.tool_then is None:

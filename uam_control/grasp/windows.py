@@ -45,19 +45,14 @@ FROM_ABOVE = Approach()
 
 
 class GraspWindow(NamedTuple):
-    """Mission times [s] of one payload.
+    """Mission times [s] of one payload."""
 
-    descent: begin of the last approach before the grip; grip: the gripper closes; lifted: end of
-    the climb after it; release: it opens; departure: begin of the next motion, at most 1 s later.
-    back (3,) [m]: from the place of the grip to that of the begin; approach: see there.
-    """
-
-    descent: float
-    grip: float
-    lifted: float
-    release: float
-    departure: float
-    back: tuple[float, float, float]
+    descent: float  # begin of the last approach before the grip
+    grip: float  # the gripper closes
+    lifted: float  # end of the climb after it
+    release: float  # it opens
+    departure: float  # begin of the next motion, at most 1 s later
+    back: tuple[float, float, float]  # [m] from the place of the grip to that of the begin
     approach: Approach = FROM_ABOVE
 
 

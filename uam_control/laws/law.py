@@ -12,17 +12,12 @@ from uam_control.maths.compiled import prepared
 
 @dataclass(frozen=True)
 class GainGroup:
-    """Published gains that share a row in the figure of the adaptation.
+    """Published gains that share a row in the figure of the adaptation."""
 
-    label: of the row; "" for gains without a row. names: of the gains and of the recorded columns.
-    symbol: for a row of several gains; the last character of a name is its index. label and symbol
-    are matplotlib mathtext. signed: drawn on a linear scale instead of a logarithmic one.
-    """
-
-    label: str
-    names: tuple[str, ...]
-    symbol: str = ""
-    signed: bool = False
+    label: str  # of the row, matplotlib mathtext; "" for gains without a row
+    names: tuple[str, ...]  # of the gains and of the recorded columns
+    symbol: str = ""  # mathtext for a row of several; the end of a name is its index
+    signed: bool = False  # drawn on a linear scale instead of a logarithmic one
 
     @classmethod
     def of_axes(cls, label: str, name: str, symbol: str, axes: int) -> Self:

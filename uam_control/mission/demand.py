@@ -26,19 +26,16 @@ STILL = 5e-7  # [rad/s] of a joint without friction
 
 
 class Excess(NamedTuple):
-    """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins.
-
-    origin: of a limit that is in no parameter, in words; ramp: the run-up or run-out it is in.
-    """
+    """A quantity beyond its limit."""
 
     quantity: str
-    value: float
+    value: float  # the worst
     limit: float
     unit: str
-    time: float
-    first: float
-    origin: str = ""
-    ramp: str = ""
+    time: float  # [s] of the worst
+    first: float  # [s] where it begins
+    origin: str = ""  # of a limit that is in no parameter, in words
+    ramp: str = ""  # the run-up or run-out it is in
 
     @property
     def beyond(self) -> float:
@@ -58,26 +55,20 @@ class Excess(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What a reference needs at times (m,) [s] of mission time.
+    """What a reference needs."""
 
-    position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; turn (m,) [rad/s^2]: change of those of roll and pitch; angles (m, n) [rad];
-    joint_rates (m, n) [rad/s]; yaw_torque (m,) [N m, FLU] of the rotors, joint_torques (m, n) [N m]
-    and magnet_force (m,) [N], the payload's apparent weight, NaN if the masses are unknown.
-    """
-
-    times: np.ndarray
-    position: np.ndarray
-    speed: np.ndarray
-    thrust: np.ndarray
-    tilt: np.ndarray
-    body_rates: np.ndarray
-    turn: np.ndarray
-    angles: np.ndarray
-    joint_rates: np.ndarray
-    yaw_torque: np.ndarray
-    joint_torques: np.ndarray
-    magnet_force: np.ndarray
+    times: np.ndarray  # (m,) [s] of mission time
+    position: np.ndarray  # (m, 3) [m]
+    speed: np.ndarray  # (m,) [m/s]
+    thrust: np.ndarray  # (m,) [N]
+    tilt: np.ndarray  # (m,) [rad]
+    body_rates: np.ndarray  # (m, 3) [rad/s, FLU]
+    turn: np.ndarray  # (m,) [rad/s^2] change of those of roll and pitch
+    angles: np.ndarray  # (m, n) [rad]
+    joint_rates: np.ndarray  # (m, n) [rad/s]
+    yaw_torque: np.ndarray  # (m,) [N m, FLU] of the rotors; NaN, as the next two: masses unknown
+    joint_torques: np.ndarray  # (m, n) [N m]
+    magnet_force: np.ndarray  # (m,) [N] the payload's apparent weight
 
     def within(self, part: slice | np.ndarray) -> Demand:
         """Return that of a part of the times."""

@@ -49,16 +49,12 @@ class _Planned:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """The check of references for one vehicle with its limits.
-
-    payload_mass [kg] is carried while the scenario's magnet is on. reserve: share of the thrust
-    beyond the weight that a reference must leave free.
-    """
+    """The check of references for one vehicle with its limits."""
 
     vehicle: VehicleDescription
     limits: MissionParameters
-    payload_mass: float
-    reserve: float = 0.0
+    payload_mass: float  # [kg] carried while the scenario's magnet is on
+    reserve: float = 0.0  # share of the thrust beyond the weight that a reference leaves free
 
     def excesses(self, scenario: Scenario) -> list[Excess]:
         """Return every limit that the scenario exceeds on a flight from the origin, the earliest

@@ -34,15 +34,14 @@ PACE_TIME = 1.0  # [s] longest time in which a grasp stops the clock at rest, se
 
 
 class GuidanceArrays(NamedTuple):
-    """reference, motion: of `Guidance`; motions (MOST, 5, 6 + n), times (MOST,) [s]: ahead, on the
-    path; drag (3,) [1/s]; numbers (1,): WHOLE, REAL."""
+    """What compiled functions use of a `Guidance`."""
 
     reference: np.ndarray
     motion: np.ndarray
-    motions: np.ndarray
-    times: np.ndarray
-    drag: np.ndarray
-    numbers: np.ndarray
+    motions: np.ndarray  # (MOST, 5, 6 + n) ahead, on the path
+    times: np.ndarray  # (MOST,) [s] of them
+    drag: np.ndarray  # (3,) [1/s]
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 class Guidance:

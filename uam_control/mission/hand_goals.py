@@ -79,15 +79,12 @@ class HandPose(Goal):
 
 @dataclass(frozen=True)
 class HandPoints(Goal):
-    """A trajectory of the end effector: times (m,) [s] from the start, wanted (m, 6), columns TOOL.
-
-    rates (2, m, 4): velocities and accelerations of x y z heading, rows of NaN where not given.
-    """
+    """A trajectory of the end effector."""
 
     flyer: Flyer
-    times: np.ndarray
-    wanted: np.ndarray
-    rates: np.ndarray
+    times: np.ndarray  # (m,) [s] from the start
+    wanted: np.ndarray  # (m, 6) columns TOOL
+    rates: np.ndarray  # (2, m, 4) and accelerations of x y z heading; NaN: not given
     columns, compared = BOTH, ("times", "wanted", "rates")
 
     @property
@@ -138,15 +135,12 @@ class HandPoints(Goal):
 
 @dataclass(frozen=True)
 class HandTwist(Goal):
-    """A jog of the end effector: linear (3,) [m/s] and angular (3,) [rad/s] velocity.
-
-    of_tool: in the axes of the tool, else of the world.
-    """
+    """A jog of the end effector."""
 
     flyer: Flyer
-    linear: np.ndarray
-    angular: np.ndarray
-    of_tool: bool = False
+    linear: np.ndarray  # (3,) [m/s]
+    angular: np.ndarray  # (3,) [rad/s]
+    of_tool: bool = False  # in the axes of the tool, else of the world
     columns = BOTH
 
     @property

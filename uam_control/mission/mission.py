@@ -30,14 +30,13 @@ FOLLOWS = (State.TAKING_OFF, State.FLYING, State.LANDING)  # states that follow 
 
 
 class MissionArrays(NamedTuple):
-    """State of a `Mission`: of its guidance and checks; supervisor, watch, numbers (1,): memory of
-    its supervisor, its `PayloadWatch` and itself, see `flight_sequence`."""
+    """State of a `Mission`."""
 
     guidance: GuidanceArrays
     checks: CheckArrays
-    supervisor: np.ndarray
-    watch: np.ndarray
-    numbers: np.ndarray
+    supervisor: np.ndarray  # (1,) memory
+    watch: np.ndarray  # (1,) memory of its `PayloadWatch`
+    numbers: np.ndarray  # (1,) WHOLE, REAL of `flight_sequence`
 
 
 class Mission(FlightSequence):

@@ -16,26 +16,19 @@ PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CH
 
 @dataclass
 class MissionOutput:
-    """Output of the mission at one tick.
+    """Output of the mission at one tick."""
 
-    reference (3, 6 + n), reused by the next step; flying: position and attitude are controlled;
-    time [s]: since take-off, negative before; arm: desired arming of the autopilot; regains: number
-    of commands so far to regain a released vehicle; state, cause: of the supervisor; abort_reason:
-    why the scenario was aborted, "" if not. grasp: state of the grasp; attempt: number of the
-    approach to the payload; grasp_text: newest decision about the payload.
-    """
-
-    reference: np.ndarray
-    flying: bool = False
-    time: float = -1.0
+    reference: np.ndarray  # (3, 6 + n), reused by the next step
+    flying: bool = False  # position and attitude are controlled
+    time: float = -1.0  # [s] since take-off, negative before
     phase: str = WAITING
     magnet: bool = False
-    arm: bool = False
-    regains: int = 0
+    arm: bool = False  # desired arming of the autopilot
+    regains: int = 0  # number of commands so far to regain a released vehicle
     done: bool = False
-    abort_reason: str = ""
-    state: State = State.GROUNDED
-    cause: str = ""
+    abort_reason: str = ""  # why the scenario was aborted
+    state: State = State.GROUNDED  # of the supervisor
+    cause: str = ""  # of the state
     grasp: Grasp = Grasp.NONE
-    attempt: int = 0
-    grasp_text: str = ""
+    attempt: int = 0  # number of the approach to the payload
+    grasp_text: str = ""  # newest decision about the payload

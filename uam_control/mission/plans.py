@@ -207,14 +207,11 @@ class Goal:
 
 @dataclass(frozen=True)
 class GoalPose(Goal):
-    """A pose to fly to: position (3,) [m, ENU] and yaw [rad]; arm: angles (n,) [rad], if it moves.
+    """A pose to fly to."""
 
-    A height of NaN keeps the present height, a yaw of NaN the present heading.
-    """
-
-    position: np.ndarray
-    yaw: float = math.nan
-    arm: np.ndarray | None = None
+    position: np.ndarray  # (3,) [m, ENU]; a height of NaN: the present one
+    yaw: float = math.nan  # [rad]; NaN: the present heading
+    arm: np.ndarray | None = None  # angles (n,) [rad], if it moves
     asked: Goal | None = None  # the goal that it solves
 
     @property
@@ -262,15 +259,11 @@ class GoalPose(Goal):
 
 @dataclass(frozen=True)
 class Points(Goal):
-    """A trajectory of base or arm or both: times (m,) [s] from the start, points (3, m, k).
+    """A trajectory of base or arm or both."""
 
-    Rates or accelerations of NaN are not given; differences of the rows above replace them.
-    columns: BASE, ARM or BOTH, of a reference.
-    """
-
-    times: np.ndarray
-    points: np.ndarray
-    columns: slice
+    times: np.ndarray  # (m,) [s] from the start
+    points: np.ndarray  # (3, m, k); NaN: rate, acceleration by differences of the row above
+    columns: slice  # BASE, ARM or BOTH, of a reference
     asked: Goal | None = None  # the goal that it solves
     compared = "times", "points"
 

@@ -22,16 +22,12 @@ OLDEST = 3.0  # [s] age of a report that still counts; it comes several times a 
 
 @dataclass(frozen=True)
 class ChecklistReport:
-    """Newest state of the checklist, of `stamp` [s].
+    """Newest state of the checklist."""
 
-    failing: names of the items that have not passed; commands: a person tilts the vehicle and looks
-    at the commanded body rates.
-    """
-
-    stamp: float
+    stamp: float  # [s]
     passed: bool
-    failing: str = ""
-    commands: bool = False
+    failing: str = ""  # names of the items that have not passed
+    commands: bool = False  # a person tilts the vehicle and looks at the commanded body rates
 
 
 class PreArm:

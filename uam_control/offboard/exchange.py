@@ -32,22 +32,15 @@ def commands_of(spoken: Firmware) -> dict[Request, tuple[MavCmd, tuple[float, ..
 
 
 class Reported(NamedTuple):
-    """The autopilot's state as last received.
+    """The autopilot's state as last received."""
 
-    connected: the last heartbeat is recent. intended: the mode that was chosen last by a person or
-    a companion (CURRENT_MODE.intended_custom_mode), UNKNOWN without that message. failsafe: the
-    autopilot flies its own failsafe (HEARTBEAT.system_status CRITICAL). delivered [s]: when the
-    newest message was sent that certainly arrived. killed: the kill switch or flight termination
-    holds the motors (HEARTBEAT.system_status FLIGHT_TERMINATION).
-    """
-
-    connected: bool
+    connected: bool  # the last heartbeat is recent
     armed: bool
     mode: Mode
-    intended: Mode = Mode.UNKNOWN
-    failsafe: bool = False
-    delivered: float = math.inf
-    killed: bool = False
+    intended: Mode = Mode.UNKNOWN  # chosen last: CURRENT_MODE.intended_custom_mode, if it comes
+    failsafe: bool = False  # it flies its own: HEARTBEAT.system_status CRITICAL
+    delivered: float = math.inf  # [s] when the newest message was sent that surely arrived
+    killed: bool = False  # by switch or termination: system_status FLIGHT_TERMINATION
 
 
 class Reasons:

@@ -72,14 +72,11 @@ FLIGHT_OWN = {
 
 @dataclass(frozen=True)
 class Profile:
-    """The parameter sets of a flight, by node, and their source: name, file, raw sections.
-
-    vehicle: the one whose derived values and number of joints the sets have.
-    """
+    """The parameter sets of a flight, by node, and their source: name, file, raw sections."""
 
     name: str
     file: Path
-    vehicle: VehicleDescription
+    vehicle: VehicleDescription  # whose derived values and number of joints the sets have
     sets: dict[str, ParameterSet]
     sections: dict[str, dict[str, Any]]
 

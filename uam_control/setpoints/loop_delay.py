@@ -55,33 +55,25 @@ STAMP, NEWEST, SETTLING = range(3)
 
 
 class DelayNumbers(NamedTuple):
-    """Numbers of a LoopDelay.
+    """Numbers of a LoopDelay."""
 
-    period [s]; forget: decay of the sums over a period; least, largest [1/s]: gains of a rate loop;
-    lag, low, high: decay over a period of the motor lag, and with the corners LOW and HIGH.
-    """
-
-    period: float
-    forget: float
-    least: float
-    largest: float
-    lag: float
-    low: float
-    high: float
+    period: float  # [s]
+    forget: float  # decay of the sums over a period
+    least: float  # [1/s] gain of a rate loop
+    largest: float  # [1/s]
+    lag: float  # decay over a period of the motor lag
+    low: float  # decay over a period with the corner LOW
+    high: float  # with the corner HIGH
 
 
 class DelaySums(NamedTuple):
-    """State of a LoopDelay.
+    """State of a LoopDelay."""
 
-    now (3,): see the entries STAMP..SETTLING; filters (12, 2); past (2, DELAYS): setpoints; sums
-    (2, 2, DELAYS); total (3,): sums of the squared accelerations, of the weights.
-    """
-
-    now: np.ndarray
-    filters: np.ndarray
-    past: np.ndarray
-    sums: np.ndarray
-    total: np.ndarray
+    now: np.ndarray  # (3,) STAMP..SETTLING
+    filters: np.ndarray  # (12, 2)
+    past: np.ndarray  # (2, DELAYS) setpoints
+    sums: np.ndarray  # (2, 2, DELAYS)
+    total: np.ndarray  # (3,) sums of the squared accelerations, of the weights
 
 
 class LoopDelay:

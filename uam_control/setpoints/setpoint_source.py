@@ -52,23 +52,17 @@ def sent(setpoint: Setpoint) -> tuple[np.ndarray, float]:
 
 
 class Situation(NamedTuple):
-    """State of the autopilot.
-
-    let_go: the mission requires the autopilot's failsafe. released: somebody else has control.
-    followed: it flies the setpoints, in OFFBOARD. stopped: the motors must stay still. withheld:
-    its reports may be older than a gap of the stream. lost: its failsafe acts since such a gap.
-    disarming: it is asked to disarm.
-    """
+    """State of the autopilot."""
 
     armed: bool
     landed: bool
-    let_go: bool
-    released: bool = False
-    followed: bool = True
-    stopped: bool = False
-    withheld: bool = False
-    lost: bool = False
-    disarming: bool = False
+    let_go: bool  # the mission requires the autopilot's failsafe
+    released: bool = False  # somebody else has control
+    followed: bool = True  # it flies the setpoints, in OFFBOARD
+    stopped: bool = False  # the motors must stay still
+    withheld: bool = False  # its reports may be older than a gap of the stream
+    lost: bool = False  # its failsafe acts since such a gap
+    disarming: bool = False  # it is asked to disarm
 
 
 def silent(text: str, key: str | None) -> None:

@@ -47,17 +47,12 @@ FLOWN_MASKS = tuple(
 
 
 class AttitudeTarget(NamedTuple):
-    """One setpoint for the autopilot, in its frames.
-
-    quaternion (4,): desired attitude FRD → NED [w x y z]; rates (3,): body rates [rad/s, FRD], for
-    ATTITUDE_AND_YAW_RATE the last is the rate about the world's vertical axis, positive downwards;
-    thrust: 0..1.
-    """
+    """One setpoint for the autopilot, in its frames."""
 
     type_mask: int
-    quaternion: np.ndarray
-    rates: np.ndarray
-    thrust: float
+    quaternion: np.ndarray  # (4,) FRD → NED [w x y z]
+    rates: np.ndarray  # (3,) [rad/s, FRD]; of ATTITUDE_AND_YAW_RATE the last: about down, world
+    thrust: float  # 0..1
 
     @classmethod
     def of_rates(cls, rates: np.ndarray, thrust: float) -> AttitudeTarget:
@@ -89,18 +84,14 @@ class AttitudeTarget(NamedTuple):
 
 
 class PositionTarget(NamedTuple):
-    """One setpoint of the motion for the autopilot's position control.
-
-    position (3,) [m], velocity (3,) [m/s], acceleration (3,) [m/s^2]: NED; yaw [rad], yaw_rate
-    [rad/s]: clockwise from north. Values that the type mask ignores are 0.
-    """
+    """One setpoint for the autopilot's position control; NED. What the mask ignores is 0."""
 
     type_mask: int
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    yaw: float
-    yaw_rate: float
+    position: np.ndarray  # (3,) [m]
+    velocity: np.ndarray  # (3,) [m/s]
+    acceleration: np.ndarray  # (3,) [m/s^2]
+    yaw: float  # [rad] clockwise from north
+    yaw_rate: float  # [rad/s]
     body_rates = NO_RATES
     thrust = math.nan  # the autopilot chooses it
 
@@ -142,20 +133,13 @@ def not_finite(target: NamedTuple, fields: Iterable[str]) -> str:
 
 @dataclass(slots=True)
 class Desired:
-    """The desired motion, from the control laws or from the level hold.
+    """The desired motion, from the control laws or from the level hold."""
 
-    rates (3,): body rates that make tau_q in the autopilot's rate loop [rad/s, FLU]; attitude
-    (3, 3): rows q_d = roll, pitch, yaw [rad, FLU in ENU], Omega_d [rad/s], Omega_d_dot [rad/s^2],
-    both in the desired body frame (FLU); thrust: 0..1; reference (3, 3): rows position [m],
-    velocity [m/s], acceleration [m/s^2] of the mission, ENU; torque (3,): tau_q in parts of the
-    largest torque, FLU; None: there is none.
-    """
-
-    rates: np.ndarray
-    attitude: np.ndarray
-    thrust: float
-    reference: np.ndarray | None = None
-    torque: np.ndarray | None = None
+    rates: np.ndarray  # (3,) that make tau_q in the autopilot's rate loop [rad/s, FLU]
+    attitude: np.ndarray  # (3, 3) q_d [rad, FLU in ENU]; Omega_d, Omega_d_dot [SI, desired FLU]
+    thrust: float  # 0..1
+    reference: np.ndarray | None = None  # (3, 3) position [m] and derivatives, ENU
+    torque: np.ndarray | None = None  # (3,) tau_q in parts of the largest, FLU
 
 
 # A setpoint type returns the part of the desired motion that is sent, in the autopilot's frames.
@@ -171,14 +155,10 @@ def level(yaw: float) -> np.ndarray:
 
 
 class VisionPose(NamedTuple):
-    """A mocap pose for the autopilot.
+    """A mocap pose for the autopilot."""
 
-    stamp [s]; position (3,) [m, ENU]; quaternion (4,) [w x y z], FLU → ENU; standard deviations [m]
-    and [rad].
-    """
-
-    stamp: float
-    position: np.ndarray
-    quaternion: np.ndarray
-    position_deviation: float
-    attitude_deviation: float
+    stamp: float  # [s]
+    position: np.ndarray  # (3,) [m, ENU]
+    quaternion: np.ndarray  # (4,) [w x y z], FLU → ENU
+    position_deviation: float  # [m] standard deviation
+    attitude_deviation: float  # [rad]

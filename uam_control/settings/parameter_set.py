@@ -30,19 +30,15 @@ class MissingParameter(ParameterError):
 
 @dataclass(frozen=True)
 class Bound:
-    """Meaning, unit and range of a numeric parameter.
-
-    length: None for one number, else the number of entries; 0: one entry per axis of the subsystem;
-    ANY_LENGTH: as many as are given. whole: an integer. optional: the list may be empty.
-    """
+    """Meaning, unit and range of a numeric parameter."""
 
     description: str
     unit: str
     low: float
     high: float
-    length: int | None = None
-    whole: bool = False
-    optional: bool = False
+    length: int | None = None  # entries; 0: one per axis; ANY_LENGTH; None: one number
+    whole: bool = False  # an integer
+    optional: bool = False  # the list may be empty
 
     @property
     def allowed(self) -> str:
@@ -70,15 +66,13 @@ class Switch:
 
 @dataclass(frozen=True)
 class Text:
-    """Meaning of a parameter that is a text; allowed: its form, for the user; a secret one is
-    never shown. file: a path is allowed, too; several: a list of texts, one text is a list of one.
-    """
+    """Meaning of a parameter that is a text."""
 
     description: str
-    allowed: str
-    secret: bool = False
-    file: bool = False
-    several: bool = False
+    allowed: str  # its form, for the user
+    secret: bool = False  # it is never shown
+    file: bool = False  # a path is allowed, too
+    several: bool = False  # a list of texts, one text is a list of one
 
 
 @dataclass(frozen=True)

@@ -24,17 +24,12 @@ KILL_SWITCH = "the kill switch is engaged, or flight termination is active"
 
 
 class PortSteps(NamedTuple):
-    """Compiled methods of a port to an autopilot in the same process, on the `arrays` of the port.
+    """Compiled methods of a port to an autopilot of this process, on its `arrays`; now [s]: tick."""
 
-    now [s]: of the tick. ready(a, now): whether messages come and setpoints go as usual; poll(a,
-    now); send_vision(a, exposed, pose): exposed [s], pose (7,): position [m, ENU] and quaternion
-    [w x y z]; send_setpoint(a, now, rates, thrust): rates (3,) [rad/s, FLU].
-    """
-
-    ready: Callable
-    poll: Callable
-    send_vision: Callable
-    send_setpoint: Callable
+    ready: Callable  # (a, now): whether messages come and setpoints go as usual
+    poll: Callable  # (a, now)
+    send_vision: Callable  # (a, exposed [s], pose (7,): position [m, ENU], quaternion [w x y z])
+    send_setpoint: Callable  # (a, now, rates (3,) [rad/s, FLU], thrust)
 
 
 class AutopilotPort(Protocol):
@@ -84,28 +79,21 @@ class AutopilotPort(Protocol):
 
 
 class AutopilotReport(NamedTuple):
-    """The autopilot's state as received by a tick.
-
-    reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
-    companion, "" if nobody has; landed: by the autopilot's land detector; failed: why the bridge
-    flies no more, "" while it may; stopped: a kill has ended the flight; lands: the autopilot's
-    mode lands by itself, or it is silent, and may do so; armed_since [ns]: first
-    tick with an armed autopilot, None while disarmed; round_trip, loop_delay [s]: None if unknown.
-    """
+    """The autopilot's state as received by a tick."""
 
     connected: bool
     mode: Mode
     armed: bool
     phase: Phase
-    reasons: tuple[str, ...]
-    released_to: str = ""
-    landed: bool = False
-    failed: str = ""
-    stopped: bool = False
-    lands: bool = False
-    armed_since: int | None = None
-    round_trip: float | None = None
-    loop_delay: float | None = None
+    reasons: tuple[str, ...]  # against arming, or for leaving OFFBOARD
+    released_to: str = ""  # who has control in place of the companion
+    landed: bool = False  # by the autopilot's land detector
+    failed: str = ""  # why the bridge flies no more
+    stopped: bool = False  # a kill has ended the flight
+    lands: bool = False  # its mode does so by itself, or it is silent, and may
+    armed_since: int | None = None  # [ns] first tick with an armed autopilot
+    round_trip: float | None = None  # [s] None: unknown
+    loop_delay: float | None = None  # [s] None: unknown
 
     def differs(self, other: AutopilotReport | None) -> bool:
         """Whether a field other than `armed_since` and the delays differs from `other`."""

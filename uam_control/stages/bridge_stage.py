@@ -82,21 +82,19 @@ LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
 
 
 class BridgeArrays(NamedTuple):
-    """State of a `BridgeStage`. Of the map, rates (3,) [rad/s, FLU]: its output, curve: of its
-    thrust; of the measurements and the poses; memories (1,) of level hold, sequence, reports and
-    bridge; sent (4,)."""
+    """State of a `BridgeStage`; memories are (1,)."""
 
-    map: np.ndarray
+    map: np.ndarray  # memory
     flat: np.ndarray
-    rates: np.ndarray
-    curve: tuple[float, float, float, float]
+    rates: np.ndarray  # (3,) [rad/s, FLU] output of the map
+    curve: tuple[float, float, float, float]  # of its thrust
     measured: MeasurementArrays
     vision: VisionArrays
-    hold: np.ndarray
-    sequence: np.ndarray
-    reports: np.ndarray
-    bridge: np.ndarray
-    sent: np.ndarray
+    hold: np.ndarray  # memory of the level hold
+    sequence: np.ndarray  # memory
+    reports: np.ndarray  # memory
+    bridge: np.ndarray  # memory
+    sent: np.ndarray  # (4,)
 
 
 class BridgeStage:

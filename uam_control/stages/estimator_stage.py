@@ -71,14 +71,13 @@ def age_at(age: np.ndarray, stamp: int) -> None:
 
 
 class StageArrays(NamedTuple):
-    """State of an `EstimatorStage`: of its estimator, its ticks with their window, and the age of
-    its poses; numbers (1,): waiting: for the first sample of an input; see the stage."""
+    """State of an `EstimatorStage`."""
 
     estimator: EstimatorArrays
-    ticks: np.ndarray
-    window: np.ndarray
-    age: np.ndarray
-    numbers: np.ndarray
+    ticks: np.ndarray  # (1,) of the stamps
+    window: np.ndarray  # of the stamps
+    age: np.ndarray  # (1,) of its poses
+    numbers: np.ndarray  # (1,) waiting: for the first sample of an input; see the stage
 
 
 class EstimatorStage:

@@ -25,31 +25,23 @@ Curve = tuple[float, float, float, float]  # see `RateThrustMap.curve`
 
 
 class MeasurementArrays(NamedTuple):
-    """State of the measurements.
+    """State of the measurements."""
 
-    sums, delay: of the loop delay; record, memory: of the thrust identification, both structured
-    (1,); lift (2,): low-passes of the collective [N] and of the normalised thrust.
-    """
-
-    sums: DelaySums
-    delay: DelayNumbers
-    record: np.ndarray
-    memory: np.ndarray
-    lift: np.ndarray
+    sums: DelaySums  # of the loop delay
+    delay: DelayNumbers  # of the loop delay
+    record: np.ndarray  # (1,) of the thrust identification
+    memory: np.ndarray  # (1,) of the thrust identification
+    lift: np.ndarray  # (2,) low-passes of the collective [N], of the normalised thrust
 
 
 class Sent(NamedTuple):
-    """What was sent at a tick.
+    """What was sent at a tick."""
 
-    rates (3,) [rad/s, FLU]; thrust 0..1; looped: whether the laws made the setpoint of a flying
-    vehicle; flown: whether the thrust acts on it; factor: of the thrust, used for the setpoint.
-    """
-
-    rates: np.ndarray
-    thrust: float
-    looped: bool
-    flown: bool
-    factor: float
+    rates: np.ndarray  # (3,) [rad/s, FLU]
+    thrust: float  # 0..1
+    looped: bool  # whether the laws made the setpoint of a flying vehicle
+    flown: bool  # whether the thrust acts on it
+    factor: float  # of the thrust, used for the setpoint
 
 
 @borrowing

@@ -28,20 +28,18 @@ class MappingError(ValueError):
 
 @dataclass(frozen=True)
 class Mapping:
-    """frame: of FRAMES; dead_man, hold: buttons; rate [Hz]; silent_after, key_time [s];
-    axes: number of the axis and its share of the limit, by row of the twist (0..5); gripper: value
-    by button; keys: (whether an axis, its number, value) by key."""
+    """What axes, buttons and keys mean."""
 
-    frame: str
-    dead_man: int
-    hold: int
-    rate: float
-    silent_after: float
+    frame: str  # of FRAMES
+    dead_man: int  # button
+    hold: int  # button
+    rate: float  # [Hz]
+    silent_after: float  # [s]
     dead_zone: float
-    axes: dict[int, tuple[int, float]]
-    gripper: dict[int, float]
-    key_time: float
-    keys: dict[str, tuple[bool, int, float]]
+    axes: dict[int, tuple[int, float]]  # axis and its share of the limit, by row of the twist
+    gripper: dict[int, float]  # value by button
+    key_time: float  # [s]
+    keys: dict[str, tuple[bool, int, float]]  # whether an axis, its number, value; by key
 
     @classmethod
     def read(cls, name: str) -> Mapping:

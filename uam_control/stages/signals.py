@@ -20,26 +20,21 @@ POSES = 8  # that arrive at a tick, at most
 
 
 class SignalArrays(NamedTuple):
-    """What compiled stages have of the `Signals`.
+    """What compiled stages have of the `Signals`."""
 
-    exposed (POSES,) [ns], poses (POSES, 7): stamps, positions and quaternions, in order of the
-    stamps, NOTHING behind the last; stamps (4,) [ns]: of the other sensors' samples; joints (3, n);
-    imu (2, 3); payload (3,): position; grip (2,). numbers (1,): stamp [ns], time [s].
-    """
-
-    exposed: np.ndarray
-    poses: np.ndarray
-    stamps: np.ndarray
-    joints: np.ndarray
-    imu: np.ndarray
-    payload: np.ndarray
-    grip: np.ndarray
+    exposed: np.ndarray  # (POSES,) [ns] stamps in their order, NOTHING behind the last
+    poses: np.ndarray  # (POSES, 7) positions and quaternions
+    stamps: np.ndarray  # (4,) [ns] of the other sensors' samples
+    joints: np.ndarray  # (3, n)
+    imu: np.ndarray  # (2, 3)
+    payload: np.ndarray  # (3,) position
+    grip: np.ndarray  # (2,)
     state: np.ndarray
     reference: np.ndarray
     attitude_reference: np.ndarray
     tau_p: np.ndarray
     tau_q: np.ndarray
-    numbers: np.ndarray
+    numbers: np.ndarray  # (1,) stamp [ns], time [s]
 
 
 @dataclass

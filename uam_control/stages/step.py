@@ -27,14 +27,12 @@ class Step(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """run(tick): the stage in Python; it returns whether the tick goes on. step(tick): its compiled
-    step, None while the objects of the tick have none. decides: whether the stage in Python may
-    change what mission or autopilot do next, by more than its signals."""
+    """A part of a tick, in Python and compiled."""
 
     name: str
-    run: Callable[[Any], bool]
-    step: Callable[[Any], Step | None] = lambda tick: None
-    decides: bool = True
+    run: Callable[[Any], bool]  # in Python; whether the tick goes on
+    step: Callable[[Any], Step | None] = lambda tick: None  # compiled, if there is one now
+    decides: bool = True  # run may change what mission or autopilot do next, by more than signals
 
 
 class Steps:

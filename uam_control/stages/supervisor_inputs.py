@@ -34,21 +34,15 @@ KINDS = GAINS + len(SUBSYSTEMS)
 
 
 class StageArrays(NamedTuple):
-    """Messages of stages, and the arrays of the inputs.
+    """Messages of stages by their kinds, and the arrays of the inputs."""
 
-    waits (KINDS,): whether a message of each kind is not read yet; at (KINDS,) [ns]: its stamp;
-    values (KINDS, m): of a pose position and quaternion, of the joints their efforts, of fingers
-    opening and force, of the lift [N] also the throttle. watched:
-    places of the gains with a limit. clock, numbers (1,): of `SupervisorInputs`.
-    """
-
-    waits: np.ndarray
-    at: np.ndarray
-    values: np.ndarray
-    watched: tuple[np.ndarray, np.ndarray, np.ndarray]
+    waits: np.ndarray  # (KINDS,) whether a message is not read yet
+    at: np.ndarray  # (KINDS,) [ns] its stamp
+    values: np.ndarray  # (KINDS, m) pose; efforts; grip; lift [N], throttle; gains
+    watched: tuple[np.ndarray, np.ndarray, np.ndarray]  # places with a limit
     inputs: InputArrays
-    clock: np.ndarray
-    numbers: np.ndarray
+    clock: np.ndarray  # (1,)
+    numbers: np.ndarray  # (1,) of `SupervisorInputs`
 
 
 class SupervisorInputs:

@@ -35,14 +35,12 @@ class VisionParameters(ParameterSet):
 
 
 class VisionArrays(NamedTuple):
-    """State of a `VisionPacing`. pose (7,): newest position and quaternion; last (7,), clock (1,):
-    see `repeated` and `counts`; numbers (1,): whether the pose waits; [s] of its exposure and that
-    of the last pose sent, interval."""
+    """State of a `VisionPacing`."""
 
-    pose: np.ndarray
-    last: np.ndarray
-    clock: np.ndarray
-    numbers: np.ndarray
+    pose: np.ndarray  # (7,) newest position and quaternion
+    last: np.ndarray  # (7,) see `repeated`
+    clock: np.ndarray  # (1,) see `counts`
+    numbers: np.ndarray  # (1,) whether the pose waits; [s]: its exposure, the last sent, interval
 
 
 class VisionPacing:

@@ -40,12 +40,7 @@ SYMMETRIC = 0.5  # share of the round trip that is on the way to the autopilot, 
 class Check(NamedTuple):
     """A monitored quantity: its name, the text of a cause, and its limits.
 
-    hold, land, failsafe: name of a parameter or of a limit in s that follows from parameters, or a
-    number. in_flight: checked only while airborne.
-    sign: -1 if a smaller value is worse. land_after, failsafe_after: names of the parameters with
-    the time beyond the limit before the reaction. start: limit before the take-off, where it is
-    lower than in flight. reading: the value's name in `Readings`. blind:
-    beyond the failsafe limit the vehicle still flies on the IMU for `blind_time`.
+    A limit is the name of a parameter, that of a limit [s] that follows from some, or a number.
     """
 
     name: str
@@ -53,13 +48,13 @@ class Check(NamedTuple):
     hold: str | float = NONE
     land: str | float = NONE
     failsafe: str | float = NONE
-    start: str | float = NONE
-    in_flight: bool = False
-    sign: int = 1
-    land_after: str = "land_after"
-    failsafe_after: str = "failsafe_after"
-    reading: str = ""
-    blind: bool = False
+    start: str | float = NONE  # before the take-off, where it is lower than in flight
+    in_flight: bool = False  # checked only while airborne
+    sign: int = 1  # -1 if a smaller value is worse
+    land_after: str = "land_after"  # name of the parameter: time beyond the limit
+    failsafe_after: str = "failsafe_after"  # the same
+    reading: str = ""  # name of the value in `Readings`
+    blind: bool = False  # beyond failsafe it still flies on the IMU for `blind_time`
 
     @property
     def unit(self) -> str:
@@ -151,20 +146,16 @@ class ExceededLimit(NamedTuple):
 
 
 class CheckArrays(NamedTuple):
-    """lowest (k,): of every quantity the lowest limit, below which no monitor changes while all are
-    quiet; box (2, 3) [m]: low and high corner; gains (3,): limits of position, attitude, arm;
-    joints (2, n): limits of the angles [rad] to either side of their middle, and the middle;
-    efforts (n,): limits [N m]. values (k,): of CHECKS; still (n,): of `stands`; numbers (1,):
-    setpoint_delay [s] of `Checks`, delay_nominal [s] and share of the parameters."""
+    """Limits and values of all quantities."""
 
-    lowest: np.ndarray
-    box: np.ndarray
-    gains: np.ndarray
-    joints: np.ndarray
-    efforts: np.ndarray
-    values: np.ndarray
-    still: np.ndarray
-    numbers: np.ndarray
+    lowest: np.ndarray  # (k,) limit of each; below them no monitor changes while all are quiet
+    box: np.ndarray  # (2, 3) [m] low and high corner
+    gains: np.ndarray  # (3,) limits of position, attitude, arm
+    joints: np.ndarray  # (2, n) limits [rad] to either side of their middle, and the middle
+    efforts: np.ndarray  # (n,) limits [N m]
+    values: np.ndarray  # (k,) of CHECKS
+    still: np.ndarray  # (n,) of `stands`
+    numbers: np.ndarray  # (1,) setpoint_delay [s] of `Checks`, delay_nominal [s] and share
 
 
 class Checks:

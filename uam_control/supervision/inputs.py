@@ -31,16 +31,15 @@ REAL = (
 
 
 class InputArrays(NamedTuple):
-    """State of `Inputs`. readings (1,), known, payload (3,), grip (2,): of `Readings`; bias_mean
-    (3,) [m/s^2]; newest (7,): see `repeated`; numbers (1,): see REAL."""
+    """State of `Inputs`."""
 
-    readings: np.ndarray
+    readings: np.ndarray  # (1,) memory of `Readings`
     known: ReadingArrays
-    payload: np.ndarray
-    grip: np.ndarray
-    bias_mean: np.ndarray
-    newest: np.ndarray
-    numbers: np.ndarray
+    payload: np.ndarray  # (3,) of `Readings`
+    grip: np.ndarray  # (2,) of `Readings`
+    bias_mean: np.ndarray  # (3,) [m/s^2]
+    newest: np.ndarray  # (7,) see `repeated`
+    numbers: np.ndarray  # (1,) REAL
 
 
 class Inputs:

@@ -24,19 +24,13 @@ class OperatorCommand(Enum):
 
 
 class Authority(NamedTuple):
-    """Who has control of the vehicle.
+    """Who has control of the vehicle."""
 
-    released_to: who has it in place of the companion, "" if nobody has. landed: whether the
-    autopilot reports that the vehicle stands on the ground. lands: whether the autopilot brings the
-    vehicle to the ground by itself: by its mode, or for all that is known of a silent one. failed:
-    why the bridge flies no more, "" while it may. stopped: a kill has ended the flight for good.
-    """
-
-    released_to: str = ""
-    landed: bool = False
-    lands: bool = False
-    failed: str = ""
-    stopped: bool = False
+    released_to: str = ""  # who, in place of the companion; "": nobody
+    landed: bool = False  # it stands on the ground, says the autopilot
+    lands: bool = False  # the autopilot by itself: by its mode, or as far as known, silent
+    failed: str = ""  # why the bridge flies no more, "" while it may
+    stopped: bool = False  # a kill has ended the flight for good
 
 
 NUMBERS = (
@@ -96,28 +90,20 @@ class Readings:
 
 @dataclass
 class Observation:
-    """One tick.
+    """One tick."""
 
-    state, reference (3, 6 + n): the estimate, and the reference. ground: height at take-off [m].
-    armed: by the autopilot's report. authority: who has control. ready: the mission allows the
-    take-off. landing_due: the scenario's landing has begun. on_ground: low and slow now; touchdown:
-    on the ground for touchdown_time; overdue: no touchdown in the allowed time. off_path: a goal or
-    trajectory replaces the scenario's path; arrived: its end is reached. above_stand: a level
-    descent may come down on a stand. end_mission: why the mission lands before its end, or "".
-    """
-
-    state: np.ndarray
-    reference: np.ndarray
-    ground: float = 0.0
-    armed: bool = False
+    state: np.ndarray  # (3, 6 + n) estimate
+    reference: np.ndarray  # (3, 6 + n)
+    ground: float = 0.0  # [m] height at take-off
+    armed: bool = False  # by the autopilot's report
     authority: Authority = Authority()
-    ready: bool = False
-    landing_due: bool = False
-    on_ground: bool = False
-    touchdown: bool = False
-    overdue: bool = False
-    off_path: bool = False
-    arrived: bool = False
-    above_stand: bool = False
-    end_mission: str = ""
+    ready: bool = False  # the mission allows the take-off
+    landing_due: bool = False  # the scenario's landing has begun
+    on_ground: bool = False  # low and slow now
+    touchdown: bool = False  # on the ground for touchdown_time
+    overdue: bool = False  # no touchdown in the allowed time
+    off_path: bool = False  # a goal or trajectory replaces the scenario's path
+    arrived: bool = False  # its end is reached
+    above_stand: bool = False  # a level descent may come down on a stand
+    end_mission: str = ""  # why the mission lands before its end
     readings: Readings = field(default_factory=Readings)

@@ -145,20 +145,15 @@ class Guide(Enum):
 
 
 class Decision(NamedTuple):
-    """The supervisor's output.
-
-    cause: why the state was entered. arm: desired arming of the autopilot. keep_magnet: an
-    energised magnet stays energised; stow: the arm moves to its landing angles. Both apply only if
-    the guide is not SCENARIO. regains: number of commands so far to regain a released vehicle.
-    """
+    """The supervisor's output."""
 
     state: State
-    cause: str
+    cause: str  # why the state was entered
     guide: Guide
-    arm: bool
-    keep_magnet: bool
-    stow: bool
-    regains: int
+    arm: bool  # desired arming of the autopilot
+    keep_magnet: bool  # an energised one stays so, unless the guide is SCENARIO
+    stow: bool  # the arm moves to its landing angles, unless the guide is SCENARIO
+    regains: int  # number of commands so far to regain a released vehicle
 
 
 class StateTransition(NamedTuple):

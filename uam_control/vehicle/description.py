@@ -19,32 +19,24 @@ GRAVITY = 9.81  # [m/s^2] of parameter sets that no vehicle's description fills
 
 @dataclass(frozen=True)
 class Rotor:
-    """One rotor, in PX4's motor order.
-
-    position: x, y, z in the base frame (FLU) [m]; counter_clockwise: seen from above.
-    """
+    """One rotor, in PX4's motor order."""
 
     name: str
-    position: tuple[float, float, float]
-    counter_clockwise: bool
+    position: tuple[float, float, float]  # x, y, z in the base frame (FLU) [m]
+    counter_clockwise: bool  # seen from above
 
 
 @dataclass(frozen=True)
 class RotorModel:
-    """Parameters common to all rotors.
+    """Parameters common to all rotors."""
 
-    thrust_coefficient [N s^2/rad^2]; speed_max [rad/s]; curve_factor f [1] in
-    T/Tmax = f u^2 + (1 - f) u for motor command u (PX4: THR_MDL_FAC); moment_ratio: reaction torque
-    per thrust [m]; lag_up, lag_down: time constants of the speed [s]; radius of the propeller [m].
-    """
-
-    thrust_coefficient: float
-    speed_max: float
-    curve_factor: float
-    moment_ratio: float
-    lag_up: float
-    lag_down: float
-    radius: float
+    thrust_coefficient: float  # [N s^2/rad^2]
+    speed_max: float  # [rad/s]
+    curve_factor: float  # f [1]: T/Tmax = f u^2 + (1 - f) u of motor command u (THR_MDL_FAC)
+    moment_ratio: float  # reaction torque per thrust [m]
+    lag_up: float  # time constant of the speed [s]
+    lag_down: float  # [s]
+    radius: float  # of the propeller [m]
 
     @property
     def lag(self) -> float:
@@ -63,28 +55,21 @@ SERVO_MODES = CURRENT_SERVO, POSITION_SERVO = "current", "position"
 
 @dataclass(frozen=True)
 class Servo:
-    """Parameters of the servo of a joint.
+    """Parameters of the servo of a joint."""
 
-    stall_torque [N m]; no_load_speed [rad/s]; effort_limit: measured torque at which the supervisor
-    holds [N m].
-    """
-
-    stall_torque: float
-    no_load_speed: float
-    effort_limit: float
+    stall_torque: float  # [N m]
+    no_load_speed: float  # [rad/s]
+    effort_limit: float  # measured torque at which the supervisor holds [N m]
 
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint of the arm; name as in the MJCF and in /joint_states.
+    """One joint of the arm."""
 
-    low, high: position limits [rad]; stowed: angle for take-off and landing [rad].
-    """
-
-    name: str
-    low: float
-    high: float
-    stowed: float
+    name: str  # as in the MJCF and in /joint_states
+    low: float  # position limit [rad]
+    high: float  # [rad]
+    stowed: float  # angle for take-off and landing [rad]
 
 
 def servo_of(numbers: dict[str, Any], joint: int) -> dict[str, Any]:
@@ -95,32 +80,23 @@ def servo_of(numbers: dict[str, Any], joint: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class VehicleDescription:
-    """The content of the file config/vehicle/NAME.yaml.
-
-    file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
-    control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
-    the file of config/autopilot with the autopilot's gains, "" if the file names none;
-    autopilot_gains: its content or the design's, by PX4's names, {} without either. end_effector:
-    site of the MJCF, "" if the file names none, see `chain_reader`. servos: of each joint. numbers:
-    the whole file, including the values that only the plant reads; an entry of `servos` that is not
-    the same for all joints is a list.
-    """
+    """The content of the file config/vehicle/NAME.yaml."""
 
     name: str
-    file: Path
-    model: Path
-    mass: float
-    gravity: float
-    control_period: float
+    file: Path  # that file
+    model: Path  # its MJCF file
+    mass: float  # with arm, without payload [kg]
+    gravity: float  # [m/s^2]
+    control_period: float  # [s]
     rotor: RotorModel
     rotors: tuple[Rotor, ...]
-    servos: tuple[Servo, ...]
+    servos: tuple[Servo, ...]  # of each joint
     joints: tuple[Joint, ...]
-    end_effector: str
-    profiles: dict[str, str]
-    autopilot: str
-    autopilot_gains: dict[str, float]
-    numbers: dict[str, Any]
+    end_effector: str  # site of the MJCF, "" if the file names none, see `chain_reader`
+    profiles: dict[str, str]  # parameter files by control law, see `profile`
+    autopilot: str  # file of config/autopilot with the autopilot's gains, "" if none is named
+    autopilot_gains: dict[str, float]  # its content or the design's, by PX4's names; {} without
+    numbers: dict[str, Any]  # the whole file; of servos that differ an entry is a list
 
     @property
     def source(self) -> str:

@@ -22,18 +22,13 @@ POSITIVE = (
 
 @dataclass(frozen=True)
 class Gripper:
-    """What holds a payload.
+    """What holds a payload."""
 
-    kind: one of KINDS. opening: closed and open, [m] of a two-finger one, else 1 and 0: a magnet is
-    on or off. force [N]: limit of each finger, 0 without; holding [N]: largest weight that it
-    holds; grip_depth [m]: of the tip below the payload's upper side, 0: on it.
-    """
-
-    kind: str = NO_GRIPPER
-    opening: tuple[float, float] = (1.0, 0.0)
-    force: float = 0.0
-    holding: float = 0.0
-    grip_depth: float = 0.0
+    kind: str = NO_GRIPPER  # one of KINDS
+    opening: tuple[float, float] = (1.0, 0.0)  # closed, open [m]; of a magnet: on, off
+    force: float = 0.0  # [N] limit of each finger, 0 without
+    holding: float = 0.0  # [N] largest weight that it holds
+    grip_depth: float = 0.0  # [m] of the tip below the payload's upper side, 0: on it
 
     @property
     def name(self) -> str:

@@ -119,13 +119,12 @@ def write_angle(
 
 
 class Flyer(NamedTuple):
-    """gravity [m/s^2]; drag (3,): linear, per mass, along the world axes [1/s]; hinge: lowest and
-    highest angle [rad] of the one that the hand hangs on."""
+    """A vehicle with an end effector, as far as its flatness goes."""
 
     chain: Chain
-    gravity: float
-    drag: np.ndarray
-    hinge: tuple[float, float] = (-math.inf, math.inf)
+    gravity: float  # [m/s^2]
+    drag: np.ndarray  # (3,) linear, per mass, along the world axes [1/s]
+    hinge: tuple[float, float] = (-math.inf, math.inf)  # [rad] of the hand, lowest and highest
 
     @classmethod
     def of(cls, vehicle: VehicleDescription) -> Flyer:

@@ -73,17 +73,13 @@ LOOKS = 0.1  # [s] between two checks of a posture
 
 @dataclass(frozen=True, eq=False)
 class HandSource:
-    """A task of the hand, and what it is flown with; where: for errors.
+    """A task of the hand, and what it is flown with."""
 
-    ramp [s]: of the task, at each end; base: its motion while the hand holds, None: as the hand
-    needs it.
-    """
-
-    where: str
+    where: str  # for errors
     task: Task
-    ramp: float
+    ramp: float  # [s] of the task, at each end
     flyer: Flyer
-    base: Polynomials | None = None
+    base: Polynomials | None = None  # its motion while the hand holds; None: as it needs it
 
     def slowed(self, factor: float) -> HandSource:
         """Return the task that takes `factor` times as long."""

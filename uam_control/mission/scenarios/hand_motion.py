@@ -34,26 +34,20 @@ class Unreachable(ValueError):
 
 
 class Task(NamedTuple):
-    """A task of the hand over time.
+    """A task of the hand over time."""
 
-    path: columns POSITION [m] and YAW (heading) [rad] of the hand, PITCH: its elevation [rad], ARM:
-    the posture [rad]. elevated, headed: whether elevation and heading are kept; moves: numbers of
-    the joints that may leave the posture for them.
-    """
-
-    path: Polynomials
-    elevated: bool
-    headed: bool
-    moves: tuple[int, ...]
+    path: Polynomials  # hand: POSITION [m], YAW (heading), PITCH (elevation) [rad]; ARM: posture
+    elevated: bool  # whether the elevation is kept
+    headed: bool  # whether the heading is kept
+    moves: tuple[int, ...]  # numbers of the joints that may leave the posture for them
 
 
 class Sampled(NamedTuple):
-    """chi (m, 6 + n) at times (m,) [s], with the attitude of a flat base; force (m, 3) [m/s^2]: of
-    the rotors, per mass."""
+    """Poses with the attitude of a flat base."""
 
-    times: np.ndarray
-    chi: np.ndarray
-    force: np.ndarray
+    times: np.ndarray  # (m,) [s]
+    chi: np.ndarray  # (m, 6 + n)
+    force: np.ndarray  # (m, 3) [m/s^2] of the rotors, per mass
 
 
 def following(task: Task, flyer: Flyer) -> Polynomials:

@@ -37,18 +37,14 @@ def at_rest(rows: np.ndarray) -> bool:
 
 
 class Needs(NamedTuple):
-    """What a trajectory needs, so that a ramp to it needs no more.
+    """What a trajectory needs, so that a ramp to it needs no more."""
 
-    limits (2, 3): acceleration, jerk and snap of the position, and of yaw and joints; force, tilt:
-    the largest [m/s^2 per mass, rad]; low, high (3,): the room [m]; least (2, 3): gentle limits.
-    """
-
-    limits: np.ndarray
-    force: float
-    tilt: float
-    low: np.ndarray
-    high: np.ndarray
-    least: np.ndarray
+    limits: np.ndarray  # (2, 3) acceleration, jerk, snap of the position, and of yaw and joints
+    force: float  # largest [m/s^2 per mass]
+    tilt: float  # largest [rad]
+    low: np.ndarray  # (3,) the room [m]
+    high: np.ndarray  # (3,)
+    least: np.ndarray  # (2, 3) gentle limits
 
     @classmethod
     def of(cls, path: Polynomials, options: ScenarioOptions) -> Needs:

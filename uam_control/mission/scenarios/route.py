@@ -62,17 +62,13 @@ class Source(Protocol):
 
 @dataclass(frozen=True)
 class Route:
-    """A trajectory, from rest to rest. legs: run-up, trajectory, run-out; ends: RETURN or LAND.
+    """A trajectory, from rest to rest."""
 
-    ramps_chosen: run-up and run-out are not part of the trajectory, so others may replace them;
-    source: of the legs, None if they are slowed down as they are.
-    """
-
-    legs: tuple[Leg, ...]
-    ends: str
+    legs: tuple[Leg, ...]  # run-up, trajectory, run-out
+    ends: str  # RETURN or LAND
     options: ScenarioOptions
-    ramps_chosen: bool = False
-    source: Source | None = None
+    ramps_chosen: bool = False  # run-up and run-out are no part of the trajectory, others may be
+    source: Source | None = None  # of the legs; None: they are slowed down as they are
 
     @classmethod
     def around(cls, path: Polynomials, ends: str, options: ScenarioOptions) -> Route:

@@ -71,32 +71,27 @@ class Grip:
 class Scenario:
     """A flight: moves, a route, or both; phases, magnet switching, landing.
 
-    Times are mission times [s]. arm_start: joint angles at take-off [rad]; payload_mass [kg];
-    drop_point: x, y [m]; phases, magnet, snapshots: (begin, value). route: without route_at it is
-    the whole flight, see `route`; with it, its motion is added to that of the moves from then on.
-    grip: what the gripper does along a route that is the whole flight; approaches: (time of a grip,
-    how the tool comes to the payload) where it is not from above.
-    notes: for the user, about the file. environment: what stands around in simulation, see
-    `environment`; None: the usual.
+    Times are mission times [s]; phases, magnet, snapshots: (begin, value). A route without route_at
+    is the whole flight, see `route`; with it, its motion is added to the moves' from then on.
     """
 
     name: str
     description: str
-    arm_start: tuple[float, ...]
+    arm_start: tuple[float, ...]  # joint angles at take-off [rad]
     phases: tuple[tuple[float, str], ...]
     landing: Landing
     moves: tuple[Move, ...] = ()
     route: Route | None = None
     route_at: float | None = None
     magnet: tuple[tuple[float, bool], ...] = ()
-    payload_mass: float = 0.0
-    drop_point: tuple[float, float] | None = None
+    payload_mass: float = 0.0  # [kg]
+    drop_point: tuple[float, float] | None = None  # x, y [m]
     snapshots: tuple[tuple[float, str], ...] = field(default=())
     faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
-    notes: tuple[str, ...] = ()
-    environment: tuple[dict[str, Any], ...] | None = None
-    grip: Grip | None = None
-    approaches: tuple[tuple[float, Approach], ...] = ()
+    notes: tuple[str, ...] = ()  # for the user, about the file
+    environment: tuple[dict[str, Any], ...] | None = None  # in simulation; None: the usual
+    grip: Grip | None = None  # along a route that is the whole flight
+    approaches: tuple[tuple[float, Approach], ...] = ()  # by the time of a grip; else from above
 
     @property
     def surroundings(self) -> dict[str, Any]:
