@@ -24,10 +24,10 @@ KILL_SWITCH = "the kill switch is engaged, or flight termination is active"
 
 
 class PortSteps(NamedTuple):
-    """Compiled methods of a port to an autopilot of this process, on its `arrays`; now [s]: tick."""
+    """Compiled methods of a port to an autopilot in this process, on its `arrays`."""
 
     ready: Callable  # (a, now): whether messages come and setpoints go as usual
-    poll: Callable  # (a, now)
+    poll: Callable  # (a, now [s])
     send_vision: Callable  # (a, exposed [s], pose (7,): position [m, ENU], quaternion [w x y z])
     send_setpoint: Callable  # (a, now, rates (3,) [rad/s, FLU], thrust)
 
