@@ -65,7 +65,7 @@ def test_a_sample_that_compiled_code_would_misread_is_refused(bad):
 def test_an_arm_command_arrives_after_the_latency_of_the_bus(latency):
     vehicle = VEHICLES["s500_arm3"].changed({"servos.command_latency_ticks": latency})
     plant, commands = MujocoPlant(vehicle, 0.0, seed=1), []
-    plant.count_from(5)  # of an earlier simulation
+    plant.tick = 5  # of an earlier simulation
     held = np.zeros(3)
     for k in range(12):
         sent = np.array([0.1 * k, np.nan if k % 3 else -0.2 * k, 0.5])

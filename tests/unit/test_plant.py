@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.actuators import Rotors, Servos
+from uam_sim_bridge.plant.actuators import Rotors, Servos, joint_step, receive, rotor_step
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.sensors import (
@@ -30,7 +30,7 @@ def rotors(commands, seconds, start=0.0):
     group.speed[:] = start
     out = np.zeros(4)
     for _ in range(round(seconds / STEP)):
-        group.step(np.asarray(commands, dtype=float), out)
+        rotor_step(np.asarray(commands, dtype=float), group.arrays, out)
     return group
 
 
@@ -54,8 +54,8 @@ def test_rotor_lag_is_faster_up_than_down():
 def test_servo_stays_within_the_torque_speed_line(effort, speed):
     numbers = NUMBERS["servos"] | {"command_latency_ticks": 0}
     servos, out = Servos(numbers, np.zeros(1)), np.zeros(1)
-    servos.take(np.array([effort]))
-    servos.step(np.zeros(1), np.array([speed]), out)
+    receive(np.array([effort]), 0, servos.arrays)
+    joint_step(servos.arrays, np.zeros(1), np.array([speed]), out)
     unit = NUMBERS["servos"]["torque_per_current"] * NUMBERS["servos"]["current_unit"]
     assert abs(out[0]) <= 3.0 + 1e-12
     if effort * speed > 0:  # driving: less torque the faster, none at no-load speed

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.actuators import rotor_step
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.acting_effects import generator
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
@@ -253,7 +254,7 @@ def test_rotors_differ_from_the_file_by_the_factors():
     assert abs(one.model.actuator("rotor_1").gear[5]) == pytest.approx(0.5 * 0.016)
     for command, share in ((0.0, 0.1), (0.5, 0.55), (1.0, 1.0)):  # of the full speed: a line
         for _ in range(400):
-            one.rotors.step(np.full(4, command), np.zeros(4))
+            rotor_step(np.full(4, command), one.rotors.arrays, np.zeros(4))
         assert one.rotors.speed[0] == pytest.approx(share * 1100.0)
 
 

@@ -10,6 +10,7 @@ from uam_control.mission import ScenarioError, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleError, chain_of
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.actuators import rotor_step
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.urdf import urdf
@@ -46,7 +47,7 @@ def test_the_mirror_hovers_at_another_command_and_turns_less_in_yaw():
     believed, true = plant(), plant("t650_mirror")
     for one in (believed, true):
         for _ in range(500):
-            one.rotors.step(np.full(4, 0.607), np.zeros(4))
+            rotor_step(np.full(4, 0.607), one.rotors.arrays, np.zeros(4))
     # kf 4.1908e-5, w = 64.0603 + 665.9904 0.607 = 468.3 rad/s: 4 rotors carry 3.746 kg
     assert 4.0 * true.rotors.thrust[0] == pytest.approx(4 * 4.1908e-5 * 468.3**2, rel=1e-3)
     assert 4.0 * true.rotors.thrust[0] == pytest.approx(3.746 * 9.81, rel=0.01)

@@ -23,6 +23,7 @@ from uam_lab.records.results.timeseries import Series, columns_of
 from uam_sim_bridge.autopilot.params import DEFINITIONS, Parameters
 from uam_sim_bridge.faults import FaultError, feasibility, read_schedule
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.actuators import joint_step
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
 S500 = load_description()
@@ -209,7 +210,7 @@ def test_a_servo_type_for_each_joint():
     assert [described.servo_numbers(i)["current_unit"] for i in range(2)] == [0.00269, 0.001]
     servos = MujocoPlant(Vehicle.of(described), 0.0, 1).servos
     servos.command[:] = 2.0
-    servos.step(np.zeros(2), np.zeros(2), np.zeros(2))
+    joint_step(servos.arrays, np.zeros(2), np.zeros(2), np.zeros(2))
     # whole current units of 3.508 mN m; the weak one's stall torque
     assert servos.torque == pytest.approx([round(2.0 / 0.00350776) * 0.00350776, 1.5])
 

@@ -190,7 +190,7 @@ class Simulator:
         if stamp > 0:
             after = stamp / SECOND + AFTER_OTHERS
             self._first_tick = math.ceil(after / self.plant.period)
-            self.plant.count_from(self._first_tick)
+            self.plant.tick = self._first_tick
             self._log.info(f"the nodes are from an earlier simulation: begins at {after:.1f} s")
 
     def _on_reset(self) -> tuple[bool, str]:
@@ -204,7 +204,7 @@ class Simulator:
         """Make the plant anew at the present tick."""
         tick, self._reset_due = self.plant.tick, False
         self.plant = self._make()
-        self.plant.count_from(tick)
+        self.plant.tick = tick
         self._faulty = self.plant if isinstance(self.plant, FaultyPlant) else None
 
     def _waiting_for(self) -> list[str]:

@@ -55,10 +55,6 @@ class Rotors:
         """Let the speed grow linearly with the command, from `idle` times the full speed on."""
         self.constants[2:] = idle**2, 2.0 * idle * (1.0 - idle), (1.0 - idle) ** 2
 
-    def step(self, commands: np.ndarray, output: np.ndarray) -> None:
-        """See `rotor_step`."""
-        rotor_step(commands, self.arrays, output)
-
 
 @borrowing
 def rotor_step(commands: np.ndarray, a: RotorArrays, output: np.ndarray) -> None:
@@ -115,14 +111,6 @@ class Servos:
         self.torque = np.zeros(len(start))
         waiting = np.full((numbers["command_latency_ticks"], len(start)), np.nan)
         self.arrays = ServoArrays(self.command, constants, loop, self.torque, waiting)
-
-    def take(self, command: np.ndarray, tick: int = 0) -> None:
-        """Send `command` (n,) at the control tick `tick`; see `receive`."""
-        receive(command, tick, self.arrays)
-
-    def step(self, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
-        """See `joint_step`."""
-        joint_step(self.arrays, angle, velocity, output)
 
 
 @borrowing

@@ -158,11 +158,11 @@ class Plant(ABC):
     """Vehicle, payload and surroundings. A class is made with the arguments of `MujocoPlant`.
 
     `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
-    periods stepped; `truth_row`: the places in the row of `observe`. `DISTURBABLE`: whether the
-    class implements `disturb`; if not, faults of the physics are refused, faults of sensors and
-    commands are accepted. `HAS_EFFECTS`: whether it simulates the effects of a preset
-    (`vehicle.numbers["effects"]`); if not, presets are refused. `senses`, `acts`: whether this
-    plant changes samples, and commands or physics, of the one in `physics`.
+    periods stepped, after those of an earlier simulation; `truth_row`: the places in the row of
+    `observe`. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the physics
+    are refused, faults of sensors and commands are accepted. `HAS_EFFECTS`: whether it simulates
+    the effects of a preset (`vehicle.numbers["effects"]`); if not, presets are refused. `senses`,
+    `acts`: whether this plant changes samples, and commands or physics, of the one in `physics`.
     """
 
     DISTURBABLE = True
@@ -189,10 +189,6 @@ class Plant(ABC):
     def time(self) -> float:
         """Simulation time [s]."""
         return self.tick * self.period
-
-    def count_from(self, tick: int) -> None:
-        """Begin to count at `tick`: stamps then follow those of an earlier simulation."""
-        self.tick = tick
 
     @abstractmethod
     def sense(self) -> Samples:

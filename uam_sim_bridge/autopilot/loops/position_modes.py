@@ -234,13 +234,9 @@ class PositionModes(Cascade):
         limit = lift * math.tan(math.radians(p["MPC_TILTMAX_AIR"]))
         across = math.hypot(acceleration[0], acceleration[1])
         scale = min(1.0, limit / across) if across > 0.0 else 1.0
-        north, east = scale * acceleration[0], scale * acceleration[1]
-        cosine, sine = math.cos(self._yaw), math.sin(self._yaw)
-        forward, right = cosine * north + sine * east, cosine * east - sine * north
-        pitch = math.atan2(-forward, lift)
-        roll = math.atan2(right * math.cos(pitch), lift)
-        size = math.sqrt(forward**2 + right**2 + lift**2)
-        desired = quaternion_from_euler(np.array([roll, pitch, self._yaw]))
+        axis = np.array([-scale * acceleration[0], -scale * acceleration[1], lift])
+        size = math.sqrt(float(axis @ axis))
+        desired = attitude_of(axis / size, self._yaw)
         attitude_rates(estimate[ATTITUDE], desired, 0.0, self._attitude_gains, self.setpoint)
         thrust = hover * size / GRAVITY
         self.setpoint[3] = min(p["MPC_THR_MAX"], max(p["MPC_THR_MIN"], thrust))
