@@ -23,7 +23,6 @@ from uam_sim_bridge.faults import (
     PROCESS,
     FaultError,
     Schedule,
-    fault_catalogue,
     feasibility,
     read_schedule,
 )
@@ -48,7 +47,7 @@ def faults(draw):
     for name, spec in kind.specs().items():
         if isinstance(spec, Choice):
             values[name] = draw(st.sampled_from(spec.choices))
-        elif name in fault_catalogue.WHOLE:
+        elif spec.whole:
             values[name] = draw(st.integers(round(spec.low), round(spec.high)))
         else:
             values[name] = draw(st.floats(spec.low, spec.high))
@@ -62,7 +61,8 @@ def test_the_option_text_of_a_fault_is_read_back(fault):
     entry = parse_spec(fault.text)
     assert timed(entry, None, "") == fault
     assert fault.text.count("=") == sum(
-        value != getattr(type(fault.fault)(), name) for name, value in fault.fault.values.items()
+        value != getattr(type(fault.fault)(), name)
+        for name, value in fault.fault.to_mapping().items()
     )
 
 
@@ -78,7 +78,7 @@ def test_a_schedule_is_read_back_from_the_parameter_of_a_node_and_from_a_file(fo
 @given(faults(), times, spans | st.none())
 def test_an_option_equals_an_entry(fault, at, duration):
     lasting = "" if duration is None else f"+{duration!r}"
-    values = ",".join(f"{name}={value}" for name, value in fault.values.items())
+    values = ",".join(f"{name}={value}" for name, value in fault.to_mapping().items())
     found = one(f"{fault.NAME}@{at!r}{lasting}" + (f":{values}" if values else ""))
     assert found == TimedFault(fault, at, math.inf if duration is None else duration)
 
@@ -106,7 +106,8 @@ def test_every_parameter_has_a_range_that_is_kept(name, parameter):
     assert parameter not in KEYS
     bad = "nonsense"
     if isinstance(spec, Bound):
-        assert spec.unit and spec.low <= getattr(FAULTS[name](), parameter) <= spec.high
+        assert spec.unit or spec.whole
+        assert spec.low <= getattr(FAULTS[name](), parameter) <= spec.high
         bad = spec.high + 1
     for value in (bad, "nan", "true"):
         with pytest.raises(FaultError, match=f"{name}: {parameter}: "):
@@ -158,8 +159,8 @@ REFUSED = {
     "mocap_dropout@inf": "at: inf is not a time",
     "mocap_dropout@20:": "NAME@SECONDS[+DURATION], NAME@PHASE",
     "mocap_dropout@20:speed=3": "speed: unknown; allowed: nothing",
-    "motor_loss@20:motor=2.5": "motor: 2.5 is not a whole number",
-    "motor_loss@20:motor=13": "motor: 13.0 is outside 1 to 12",
+    "motor_loss@20:motor=2.5": "motor: 2.5 is no integer",
+    "motor_loss@20:motor=13": "motor: 13 is outside 1 to 12",
     "motor_loss@20:motor": "'motor' is not one parameter=value",
     "motor_loss@20:motor=1,motor=2": "'motor=2' is not one parameter=value",
     "motor_loss@20:at=3": "'at=3' is not one parameter=value",

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from uam_control.settings.parameter_set import number
+from uam_control.settings.parameter_set import integer, number
 from uam_sim_bridge.faults.fault import Occurrence, PlantCommands, PlantFault
 from uam_sim_bridge.plant import Disturbance
 
@@ -21,21 +21,21 @@ class PhysicsFault(PlantFault):
 class ServoWeak(PlantFault):
     """A servo gives only a fraction of the commanded torque."""
 
-    joint: float = number(1, JOINT, "1", 1, 7)
+    joint: int = integer(1, JOINT, 1, 7)
     remaining: float = number(0.0, "fraction of the torque that remains", "1", 0.0, 1.0)
 
     def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
-        commands.effort[int(self.joint) - 1] *= self.remaining
+        commands.effort[self.joint - 1] *= self.remaining
 
 
 class ServoJam(PhysicsFault):
     """A joint's gear jams and holds its present angle."""
 
-    joint: float = number(1, JOINT, "1", 1, 7)
+    joint: int = integer(1, JOINT, 1, 7)
     torque: float = number(20.0, "torque that still moves the joint", "N m", 0.1, 1000.0)
 
     def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
-        physics.joint_friction[int(self.joint) - 1] += self.torque
+        physics.joint_friction[self.joint - 1] += self.torque
 
 
 class MagnetWeak(PhysicsFault):
@@ -66,11 +66,11 @@ class PayloadSwing(PhysicsFault):
 class MotorLoss(PhysicsFault):
     """A motor gives only a fraction of its thrust, as with a broken propeller."""
 
-    motor: float = number(1, "motor number, in PX4's order", "1", 1, 12)
+    motor: int = integer(1, "motor number, in PX4's order", 1, 12)
     remaining: float = number(0.5, "fraction of the thrust that remains", "1", 0.0, 1.0)
 
     def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
-        physics.rotor_parts[int(self.motor) - 1] *= self.remaining
+        physics.rotor_parts[self.motor - 1] *= self.remaining
 
 
 class BatterySag(PhysicsFault):

@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from uam_control.settings.parameter_set import number
+from uam_control.settings.parameter_set import integer, number
 from uam_sim_bridge.faults.fault import CABLE, Fault
 
 JOINT = "joint number"
@@ -35,12 +35,12 @@ class CableFault(Fault):
 class JointFault(CableFault):
     """A fault of a joint's servo."""
 
-    joint: int = number(1, JOINT, "1", 1, 7)
+    joint: int = integer(1, JOINT, 1, 7)
 
     @property
     def index(self) -> int:
         """Place of the servo in the chain, from 0."""
-        return int(self.joint) - 1
+        return self.joint - 1
 
 
 class BusUnplugged(CableFault):
@@ -53,7 +53,7 @@ class BusUnplugged(CableFault):
 class ServoUnplugged(JointFault):
     """The cable to a servo is pulled; it and those behind it have no supply."""
 
-    joint: int = number(2, JOINT, "1", 1, 7)
+    joint: int = integer(2, JOINT, 1, 7)
 
     def pull(self, lab: Any, on: bool) -> None:
         before = [one.id for one in lab.servos][: self.index]
@@ -184,20 +184,20 @@ class HilUnplugged(CableFault):
 class WrongId(JointFault):
     """A servo has another id than the hardware file."""
 
-    joint: int = number(2, JOINT, "1", 1, 7)
-    id: int = number(9, "its id", "1", 0, 252)
+    joint: int = integer(2, JOINT, 1, 7)
+    id: int = integer(9, "its id", 0, 252)
 
     def mount(self, servos: list[Any]) -> None:
-        servos[self.index] = replace(servos[self.index], id=int(self.id))
+        servos[self.index] = replace(servos[self.index], id=self.id)
 
 
 class JointsSwapped(JointFault):
     """The ids of two servos are swapped."""
 
-    other: int = number(2, "number of the other joint", "1", 1, 7)
+    other: int = integer(2, "number of the other joint", 1, 7)
 
     def mount(self, servos: list[Any]) -> None:
-        i, j = self.index, int(self.other) - 1
+        i, j = self.index, self.other - 1
         one, other = servos[i], servos[j]
         servos[i], servos[j] = replace(one, id=other.id), replace(other, id=one.id)
 

@@ -4,12 +4,12 @@ A fault is a subclass of the base of its kind. Its fields are its parameters, it
 description for the user, and its name is that of the class: `MotorLoss` is `motor_loss`.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
 
-from uam_control.settings.parameter_set import NamedSet, choice, number
+from uam_control.settings.parameter_set import NamedSet, choice, integer, number
 from uam_sim_bridge.plant import Disturbance, Samples
 
 PLANT, LINK, PROCESS, CABLE = "plant", "MAVLink", "process", "cable"
@@ -19,15 +19,11 @@ class FaultError(ValueError):
     """A fault that cannot be injected; the text is one line: what is wrong, what is allowed."""
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(number, choice))
+@dataclass_transform(frozen_default=True, field_specifiers=(integer, number, choice))
 class Fault(NamedSet):
     """Base of all faults. PLACE: PLANT, LINK, PROCESS or CABLE."""
 
     PLACE: ClassVar[str] = ""
-
-    @property
-    def values(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass

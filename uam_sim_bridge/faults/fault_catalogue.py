@@ -3,7 +3,6 @@
 from types import ModuleType
 
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError
-from uam_control.settings.texts import unknown
 from uam_sim_bridge.faults import (
     actuator_faults,
     cable_faults,
@@ -28,19 +27,16 @@ def _faults(module: ModuleType) -> list[type[Fault]]:
 
 
 FAULTS: dict[str, type[Fault]] = {kind.NAME: kind for one in KINDS for kind in _faults(one)}
-WHOLE = ("joint", "motor", "other", "id")  # parameters that must be whole numbers
 
 
 def make(name: object, values: dict[str, object]) -> Fault:
     """Return the fault `name` with the parameters `values`; raises FaultError in one line."""
     if not isinstance(name, str) or name not in FAULTS:
         raise FaultError(f"unknown fault {name!r}; there are: {', '.join(FAULTS)}")
-    for parameter, value in values.items():
-        if parameter not in FAULTS[name].specs():
-            said = unknown(parameter, FAULTS[name].specs())
-            raise FaultError(f"{name}: {parameter}: {said}")
-        if parameter in WHOLE and isinstance(value, float) and not value.is_integer():
-            raise FaultError(f"{name}: {parameter}: {value!r} is not a whole number")
+    for parameter, spec in FAULTS[name].specs().items():
+        value = values.get(parameter)
+        if isinstance(value, float) and value.is_integer() and getattr(spec, "whole", False):
+            values = values | {parameter: int(value)}  # 2.0 is a whole number, too
     try:
         return FAULTS[name].from_mapping(values)
     except ParameterError as error:
@@ -62,7 +58,7 @@ def parameters(kind: type[Fault]) -> list[str]:
     for name, spec in kind.specs().items():
         default = getattr(usual, name)
         if isinstance(spec, Bound):
-            unit = "" if spec.unit == "1" else f" {spec.unit}"
+            unit = "" if spec.unit in ("", "1") else f" {spec.unit}"
             span = f"{spec.low:.4g} to {spec.high:.4g}{unit}: {default:.4g}"
             words.append(f"`{name}`: {spec.description} ({span})")
         elif isinstance(spec, Choice):

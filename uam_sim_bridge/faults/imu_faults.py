@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uam_control.settings.parameter_set import choice, number
+from uam_control.settings.parameter_set import choice, integer, number
 from uam_sim_bridge.faults.fault import Fault, Occurrence, PlantFault
 from uam_sim_bridge.plant import Samples
 
@@ -91,13 +91,13 @@ def of_the_companion(fault: Fault) -> bool:
 class EncoderStuck(PlantFault):
     """A joint's encoder repeats its angle and reports zero velocity."""
 
-    joint: float = number(1, "joint number", "1", 1, 7)
+    joint: int = integer(1, "joint number", 1, 7)
 
     def sense(self, samples: Samples, now: Occurrence) -> None:
         if samples.joints is None:
             return
         stamp, alpha, alpha_dot, torque = samples.joints
-        joint = int(self.joint) - 1
+        joint = self.joint - 1
         if now.memory is None:
             now.memory = alpha[joint]
         alpha, alpha_dot = alpha.copy(), alpha_dot.copy()

@@ -57,7 +57,7 @@ class TimedFault:
     def entry(self) -> dict[str, Any]:
         """Return the fault as an entry of a file."""
         lasting = {} if math.isinf(self.duration) else {"duration": self.duration}
-        return {"fault": self.fault.NAME, **self.moment, **lasting, **self.fault.values}
+        return {"fault": self.fault.NAME, **self.moment, **lasting, **self.fault.to_mapping()}
 
     @property
     def moment(self) -> dict[str, Any]:
@@ -74,7 +74,7 @@ class TimedFault:
         times += [] if math.isinf(self.duration) else [str(self.duration)]
         given = [
             f"{name}={value}"
-            for name, value in self.fault.values.items()
+            for name, value in self.fault.to_mapping().items()
             if value != getattr(usual, name)
         ]
         return f"{self.fault.NAME}@{'+'.join(times)}" + (":" + ",".join(given) if given else "")

@@ -34,7 +34,7 @@ class FaultState:
     @property
     def record(self) -> dict[str, Any]:
         """Return the entry of `faults` in metrics.json and info.json."""
-        return record(self.fault.NAME, self.begin, self.end, self.fault.values)
+        return record(self.fault.NAME, self.begin, self.end, self.fault.to_mapping())
 
 
 def record(name: str, begin: float, end: float | None, values: dict[str, Any]) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def mistaken_chain(chain: ArmChain, mistakes: Schedule) -> tuple[ServoDescriptio
     """Return the servos as mounted, in the order of the joints. Raises FaultError."""
     servos = list(chain.servos)
     for fault in (one.fault for one in mistakes.faults):
-        joint = max(fault.values.get(name, 0) for name in ("joint", "other"))
+        joint = max(fault.to_mapping().get(name, 0) for name in ("joint", "other"))
         if joint > len(servos):
             raise FaultError(f"{fault.NAME}: joint {joint:g}: the vehicle has {len(servos)}")
         fault.mount(servos)

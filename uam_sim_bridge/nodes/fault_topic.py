@@ -19,5 +19,5 @@ class FaultTopic:
         """Publish the events at `stamp` [ns]."""
         for one in changed:
             fault = one.fault
-            event = FaultEvent(fault.NAME, fault.PLACE, one.number, one.active, fault.values)
+            event = FaultEvent(fault.NAME, fault.PLACE, one.number, one.active, fault.to_mapping())
             self._publisher.publish(event.to_message(stamp))

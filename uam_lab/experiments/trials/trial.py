@@ -143,7 +143,7 @@ def _fly_nodes(trial: Trial) -> Outcome:
     """
     from uam_lab.flights.ros import engine
 
-    needed = {one.fault.values["node"] for one in trial.faults.only(PROCESS).faults}
+    needed = {one.fault.to_mapping()["node"] for one in trial.faults.only(PROCESS).faults}
     left_out = tuple(name for name in ONLOOKERS if name not in needed)
     settings = trial.settings(without=left_out)
     prepare()

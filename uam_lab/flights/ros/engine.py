@@ -248,7 +248,7 @@ class SimulatedCourse(Course):
     def _announce(self, one: FaultState) -> None:
         """Print and record the start or end of a fault."""
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
-        node = one.fault.values["node"]
+        node = one.fault.to_mapping()["node"]
         process = self.children.process_of(node)
         affected = node if process == node else f"{node}, hence of the process {process},"
         self.flight.observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
