@@ -156,11 +156,11 @@ def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
         "    k_ceiling: [5.0, 5.0, 5.0, 5.0]\n    acceleration_limit: 0.0\n"
     )
     found = parameters.compare(file)
-    rows = {row.name: row for row in found.controllers["position_controller"]}
+    rows = {row.name: row for row in found["controllers"]["position_controller"]}
     assert (rows["lambda_1"].flown, rows["lambda_1"].paper) == ("2, 2, 7.5", "2, 2, 4")
     assert rows["lambda_1"].differs
     assert not rows["epsilon"].differs
-    assert found.safeguards == {"position_controller": ["k_ceiling = 5 (each)"]}
+    assert found["safeguards"] == {"position_controller": ["k_ceiling = 5 (each)"]}
     words = text_of(pages.write_page(flight_folder).read_text())
     assert "position_controller: k_ceiling = 5 (each)" in words
     assert "No safeguard was on" not in words
@@ -170,15 +170,15 @@ def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
     from uam_control.settings import configuration
 
     found = parameters.compare(configuration.path("profiles/paper_table1.yaml"))
-    assert found.safeguards == {}
-    assert not any(row.differs for rows in found.controllers.values() for row in rows)
+    assert found["safeguards"] == {}
+    assert not any(row.differs for rows in found["controllers"].values() for row in rows)
 
 
 def test_a_reconstructed_law_is_labelled_and_not_compared_with_table_one(flight_folder):
     from uam_control.settings import configuration
 
     file = configuration.path("profiles/asmc2.yaml")
-    rows = {row.name: row for row in parameters.compare(file).controllers["arm_controller"]}
+    rows = {row.name: row for row in parameters.compare(file)["controllers"]["arm_controller"]}
     assert rows["varpi"].paper == "" and not rows["varpi"].differs  # varpi of another law
     assert rows["kappa"].description.startswith("kappa")
     assert rows["torque_max"].paper != ""

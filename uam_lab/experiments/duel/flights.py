@@ -17,7 +17,7 @@ from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify
+from uam_lab.experiments.trials.outcome import COMPLETED, Ended, classify
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.experiments.trials.trial import Trial, figures_of, recorded
 from uam_lab.flights.direct.flight import DirectFlight
@@ -54,7 +54,7 @@ class Duel:
 
 
 @dataclass(frozen=True)
-class DuelResult:
+class DuelResult(Ended):
     """One flight: RMS errors where `judged`, of a pick those of the flight, NaN for a hover or an
     early end: end effector, platform [m], heading [deg], worst joint [deg]; standing [m]: mean
     offset of the end effector in hover; outcome: one of `outcome.OUTCOMES`. Of a pick: largest,
@@ -76,16 +76,6 @@ class DuelResult:
     set_down: float = NOTHING
     rho: float = NOTHING
     placed: float = NOTHING
-
-    @property
-    def done(self) -> bool:
-        """Whether the mission was completed."""
-        return self.outcome == COMPLETED
-
-    @property
-    def lost(self) -> bool:
-        """Whether the vehicle fell or was out of control."""
-        return self.outcome == LOST
 
 
 ROWS = Rows(DuelResult)
@@ -257,7 +247,7 @@ def _errors(duel: Duel, results: Results, tasks: Sequence[str], measure: int) ->
 def _picks(duel: Duel, results: Results, task: str) -> str:
     rows = []
     for label in dict.fromkeys((*duel.published, *duel.rows)):
-        own = [r for r in _of(results, label, task) if r.done]
+        own = [r for r in _of(results, label, task) if r.completed]
         cells = [_cell(duel, results, label, task, PICKED, k) for k in range(len(PICKED))]
         worst = [
             shown(max(map(value, own), default=np.nan), digits) for _, value, digits in LOADING
@@ -283,7 +273,7 @@ def _robust(duel: Duel, results: Results) -> str:
         own = [r for r in results if r.row == label and not r.delay]
         joint = mean(r.joint for r in own)
         offset = MILLI * mean(r.standing for r in own)
-        early, lost = sum(not r.done for r in own), sum(r.lost for r in own)
+        early, lost = sum(not r.completed for r in own), sum(r.lost for r in own)
         numbers = [shown(joint, 2), shown(offset, 1), survived(results, label)]
         rows.append([label, *numbers, f"{early} of {len(own)}", str(lost)])
     head = ["row", "worst joint, RMSE [deg]", "standing offset [mm]", "survived delay [ms]"]
@@ -292,7 +282,7 @@ def _robust(duel: Duel, results: Results) -> str:
 
 def survived(results: Results, label: str) -> str:
     """Return the largest delay [ms] up to which every hover of a row was completed."""
-    tried = sorted((r.delay, r.done) for r in results if r.row == label and r.delay)
+    tried = sorted((r.delay, r.completed) for r in results if r.row == label and r.delay)
     best, end = 0.0, ""
     for delay, done in tried:
         if not done:

@@ -99,19 +99,20 @@ def _flown_by_workers(
     numbers: list[int] = []
     keep: dict[int, Path] = {}  # the files to keep, of the flights that are handed out
 
-    def errands() -> Iterator[_Errand]:
+    def sent() -> Iterator[Trial]:
+        """Yield the trials for workers: those with any file to keep return the file's content."""
         for number, trial in numbered:
             numbers.append(number)
             if trial.keep is not None:
                 keep[number], trial = trial.keep, replace(trial, keep=Path())
             if place.scheduler:
                 trial = replace(trial, carried=carried(trial.scenario, trial.profile))
-            yield _Errand(work, trial)
+            yield trial
 
     if not place.scheduler:
         prepare()  # here once, not in every worker
     with workers(place, prepare, partial(print, flush=True)) as crew:
-        for k, (result, content) in crew.completed(_run, errands()):
+        for k, (result, content) in crew.completed(partial(_run, work), sent()):
             number = numbers[k]
             if number in keep:
                 with replacing(keep.pop(number)) as temporary:
@@ -119,22 +120,13 @@ def _flown_by_workers(
             yield number, result
 
 
-@dataclass(frozen=True)
-class _Errand:
-    """What a worker gets. A trial with any file to keep returns the file's content."""
-
-    work: Work
-    trial: Trial
-
-
-def _run(errand: _Errand) -> tuple[Any, bytes | None]:
+def _run(work: Work, trial: Trial) -> tuple[Any, bytes | None]:
     """Fly in a worker; return the result and the content of the file to keep, if any."""
-    trial = errand.trial
     if trial.carried is not None:
         trial = replace(trial, profile=arrived(trial.carried, trial.profile))
     if trial.keep is None:
-        return errand.work(trial), None
+        return work(trial), None
     with tempfile.TemporaryDirectory(prefix="uam-keep-") as folder:
         file = Path(folder) / "kept.parquet"
-        result = errand.work(replace(trial, keep=file))
+        result = work(replace(trial, keep=file))
         return result, file.read_bytes()

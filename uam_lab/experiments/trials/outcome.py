@@ -23,6 +23,21 @@ OUTCOMES = {
 }
 
 
+class Ended:
+    """What has an `outcome`, one of OUTCOMES."""
+
+    outcome: str
+
+    @property
+    def completed(self) -> bool:
+        return self.outcome == COMPLETED
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle fell, landed hard or was out of control."""
+        return self.outcome == LOST
+
+
 def counts(outcomes: Iterable[str]) -> dict[str, int]:
     """Return the number of each outcome, in the order of OUTCOMES."""
     counted = Counter(outcomes)

@@ -13,7 +13,7 @@ from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.experiments.trials.carried import Carried
-from uam_lab.experiments.trials.outcome import COMPLETED, LOST, classify, explained
+from uam_lab.experiments.trials.outcome import Ended, classify, explained
 from uam_lab.experiments.trials.rows import Rows
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.flights.direct.warm_up import prepare
@@ -79,7 +79,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class TrialResult:
+class TrialResult(Ended):
     """Result of a flight. rms, largest (6 + n,): errors of the `coordinates`, in m and
     deg, NaN without a take-off.
 
@@ -107,15 +107,6 @@ class TrialResult:
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries of rms and largest."""
         return coordinates(len(self.rms) - ALPHA)
-
-    @property
-    def completed(self) -> bool:
-        return self.outcome == COMPLETED
-
-    @property
-    def lost(self) -> bool:
-        """Whether the vehicle fell, landed hard or was out of control."""
-        return self.outcome == LOST
 
 
 def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> Outcome:

@@ -35,25 +35,11 @@ class ParameterRow:
     safeguard_on: bool
 
 
-@dataclass(frozen=True)
-class ParameterTable:
-    """Rows per controller and per other node, and the active safeguards."""
-
-    controllers: dict[str, list[ParameterRow]]
-    others: dict[str, list[ParameterRow]]
-
-    @property
-    def safeguards(self) -> dict[str, list[str]]:
-        """Return controller → active safeguards with values; controllers without any are absent."""
-        on = {
-            node: [f"{row.name} = {row.flown}" for row in rows if row.safeguard_on]
-            for node, rows in self.controllers.items()
-        }
-        return {node: names for node, names in on.items() if names}
-
-
-def compare(parameter_file: Path) -> ParameterTable:
+def compare(parameter_file: Path) -> dict[str, dict[str, list]]:
     """Compare the effective parameters of a flight with the verbatim Table I.
+
+    Returns `controllers` and `others`: node → its rows; `safeguards`: controller → its active ones
+    with values, without controllers that have none.
 
     Raises ProfileError if the file is missing or is no ROS parameter file.
     """
@@ -64,10 +50,16 @@ def compare(parameter_file: Path) -> ParameterTable:
         specs = _specs(parameter_file, node, values)
         table = _table(paper[node], specs) if node in paper else {}
         rows[node] = [_row(name, value, table, specs) for name, value in values.items()]
-    return ParameterTable(
-        {node: rows[node] for node in CONTROLLERS if node in rows},
-        {node: found for node, found in rows.items() if node not in CONTROLLERS and found},
-    )
+    controllers = {node: rows[node] for node in CONTROLLERS if node in rows}
+    on = {
+        node: [f"{row.name} = {row.flown}" for row in found if row.safeguard_on]
+        for node, found in controllers.items()
+    }
+    return {
+        "controllers": controllers,
+        "others": {n: found for n, found in rows.items() if n not in CONTROLLERS and found},
+        "safeguards": {node: names for node, names in on.items() if names},
+    }
 
 
 def _specs(file: Path, node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
