@@ -11,6 +11,7 @@ from uam_control.settings.configuration import path
 from uam_control.vehicle import load_description
 from uam_lab.cli.campaign import usual_ranges
 from uam_lab.cli.command import again, given_profile
+from uam_lab.cli.main import main
 from uam_lab.cli.parser import parsed
 from uam_lab.experiments.trials.carried import inputs
 
@@ -88,3 +89,14 @@ def test_the_command_that_flies_a_cell_again_has_each_option_once_per_value():
         "uam fly --engine direct --scenario hover --seed 3 --vehicle s500_arm "
         "--profile s500 --profile hand --plant-preset laboratory"
     )
+
+
+def test_ctrl_c_says_what_continues(tmp_path, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("uam_lab.experiments.trials.experiment.flown_by", interrupted)
+    out = tmp_path / "out"
+    assert main(["campaign", "--flights", "2", "--out", str(out)]) == 130
+    said = f"uam campaign: interrupted; the same command with --out {out} continues\n"
+    assert capsys.readouterr().err.endswith(said)

@@ -111,9 +111,9 @@ def run(options: argparse.Namespace) -> int:
     except BaseException as error:
         expected = isinstance(error, OSError) or type(error).__module__.startswith(OURS)
         if not expected:
-            if not _interrupted(error):
+            if (ended := _interrupted(error)) is None:
                 raise
-            say(f"uam {options.command}: interrupted", error=True)
+            say("; ".join([f"uam {options.command}: interrupted", *ended.args]), error=True)
             return INTERRUPTED
         if getattr(error, "errno", None) in FULL:
             say(f"uam {options.command}: {_full(error)}", error=True)
@@ -124,11 +124,11 @@ def run(options: argparse.Namespace) -> int:
         return WRONG_USE
 
 
-def _interrupted(error: BaseException | None) -> bool:
-    """Return whether Ctrl-C is behind an error: an import that it ends may fail in other words."""
+def _interrupted(error: BaseException | None) -> KeyboardInterrupt | None:
+    """Return the Ctrl-C behind an error: an import that it ends may fail in other words."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
-    return error is not None
+    return error
 
 
 def _full(error: OSError) -> str:

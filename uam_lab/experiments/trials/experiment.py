@@ -62,7 +62,7 @@ class Experiment:
 
         trial: of a key, made when a worker needs it; describe: text about the newest result.
         Returns key → result of all `keys`, in their order. Raises RowTableError if the table has
-        flights with other inputs.
+        flights with other inputs, KeyboardInterrupt with what continues.
         """
         table = RowTable(self.table, self.rows.schema, self.inputs)
 
@@ -73,11 +73,15 @@ class Experiment:
         before = len(keys) - len(missing)
         if before:
             say(f"{self.name}: continuing after {before} earlier flights")
-        with Counting(self.name, len(keys)) as counting, table:
-            flown = flown_by(self.place, map(trial, missing), self.work)
-            for done, (number, result) in enumerate(flown, before + 1):
-                table.add(self.rows.to_row(missing[number], result))
-                counting.show(done, describe(result))
+        try:
+            with Counting(self.name, len(keys)) as counting, table:
+                flown = flown_by(self.place, map(trial, missing), self.work)
+                for done, (number, result) in enumerate(flown, before + 1):
+                    table.add(self.rows.to_row(missing[number], result))
+                    counting.show(done, describe(result))
+        except KeyboardInterrupt:
+            again = f"the same command with --out {self.table.parent} continues"
+            raise KeyboardInterrupt(again) from None
         rows = {row[table.key]: row for row in table.compact().to_pylist()}
         return {key: self.rows.from_row(rows[key]) for key in keys}
 
