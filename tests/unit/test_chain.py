@@ -11,11 +11,12 @@ from random_chains import in_pinocchio, pin, random_chain, unit
 from uam_control.arm.chain import ChainParameters, as_parameters, carrying
 from uam_control.arm.kinematics import (
     DOWN,
+    LINK,
     gravity_torque,
     hand_jacobian,
     hand_pose,
-    inverse_dynamics,
     mass_matrix,
+    newton_euler,
     vehicle_centre,
 )
 from uam_control.settings.parameter_set import ParameterError
@@ -50,9 +51,8 @@ def test_two_hundred_random_chains_against_pinocchio():
         a = np.concatenate([force, turning, motion[2]])
         expected = pin.rnea(model, data, q, v, a)
         torques = np.zeros(n)
-        push, moment = inverse_dynamics(
-            chain, motion, tuple(force), tuple(spin), tuple(turning), torques
-        )
+        base = tuple(force), tuple(spin), tuple(turning)
+        push, moment = newton_euler(chain, motion, *base, torques, np.zeros((n, LINK, 3)))
         np.testing.assert_allclose(torques, expected[6:] + chain.armature * motion[2], atol=1e-10)
         own = pin.Inertia(chain.base_mass, chain.base_centre, chain.base_inertia)
         moves = pin.Motion(force, turning)
@@ -127,9 +127,8 @@ def test_a_tilted_offset_mount_against_mujoco(tilted):
         motion = np.stack([q, data.qvel[6:], accelerations[6:]])
         force = turn @ (accelerations[:3] + (0.0, 0.0, 9.81))
         torques, spin = np.zeros(3), data.qvel[3:6]
-        push, moment = inverse_dynamics(
-            chain, motion, tuple(force), tuple(spin), tuple(accelerations[3:6]), torques
-        )
+        base = tuple(force), tuple(spin), tuple(accelerations[3:6])
+        push, moment = newton_euler(chain, motion, *base, torques, np.zeros((3, LINK, 3)))
         damping = chain.damping * motion[1]
         friction = data.qfrc_inverse[6:] - torques - damping
         np.testing.assert_allclose(friction[[0, 2]], 0.0, atol=1e-10)
@@ -165,7 +164,8 @@ def test_one_and_two_links_by_hand():
     np.testing.assert_allclose(torques, [45 + 30 * 2, 20 + 30], atol=1e-12)
     # the elbow swings: centrifugal force of 2 kg at 1 m and 3 rad/s pulls at the shoulder's side
     motion = np.array([[0.0, math.pi / 2], [0.0, 3.0], [0.0, 0.0]])
-    inverse_dynamics(chain, motion, *[(0.0, 0.0, 0.0)] * 3, torques)
+    none = [(0.0, 0.0, 0.0)] * 3
+    newton_euler(chain, motion, *none, torques, np.zeros((2, LINK, 3)))
     np.testing.assert_allclose(torques, [-2 * 9 * 1.0, 0.0], atol=1e-12)
 
 

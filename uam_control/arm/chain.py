@@ -12,7 +12,7 @@ How others use it:
     hand_jacobian(chain, q, DOWN, jacobian)                    # (6, n): linear, then angular
     centre = vehicle_centre(chain, q, DOWN)
     # dynamics in kinematics.py
-    push, moment = inverse_dynamics(chain, motion, force, rates, turning, torques)
+    push, moment = newton_euler(chain, motion, force, rates, turning, torques, found)
     push, moment = gravity_torque(chain, q, force, torques)
     mass_matrix(chain, q, matrix)
     carrying(chain, mass)              # the same arm with a point mass at its hand

@@ -135,26 +135,6 @@ def vehicle_centre(chain: Chain, angles: np.ndarray, down: Vector) -> Vector:
     return times(1.0 / (mass + chain.base_mass), moment)
 
 
-@jit
-def inverse_dynamics(
-    chain: Chain,
-    motion: np.ndarray,
-    force: Vector,
-    rates: Vector,
-    turning: Vector,
-    torques: np.ndarray,
-) -> tuple[Vector, Vector]:
-    """Write the joint torques (n,) [N m] of a motion; return force [N] and moment [N m].
-
-    motion (3, n): angles [rad], rates, accelerations of the joints; of the base, all in its frame
-    (FLU): force [m/s^2], the specific force R^T (p_ddot + g e3) at its origin, rates [rad/s] and
-    turning [rad/s^2], their derivative. Force and moment are those that the base exerts on the arm,
-    the moment about the base's origin. Without friction and damping of the joints.
-    """
-    found = np.empty((motion.shape[1], LINK, 3))
-    return newton_euler(chain, motion, force, rates, turning, torques, found)
-
-
 @borrowing
 def newton_euler(
     chain: Chain,
@@ -165,7 +145,14 @@ def newton_euler(
     torques: np.ndarray,
     found: np.ndarray,
 ) -> tuple[Vector, Vector]:
-    """Do what `inverse_dynamics` does, with the memory found (n, LINK, 3) of the links."""
+    """Write the joint torques (n,) [N m] of a motion; return force [N] and moment [N m].
+
+    motion (3, n): angles [rad], rates, accelerations of the joints; of the base, all in its frame
+    (FLU): force [m/s^2], the specific force R^T (p_ddot + g e3) at its origin, rates [rad/s] and
+    turning [rad/s^2], their derivative; found (n, LINK, 3): memory. Force and moment are those that
+    the base exerts on the arm, the moment about the base's origin. Without friction and damping of
+    the joints.
+    """
     count = motion.shape[1]
     place, turn = ORIGIN, LEVEL
     for i in range(count):
@@ -210,8 +197,9 @@ def vehicle_dynamics(
     turning: Vector,
     torques: np.ndarray,
 ) -> tuple[Vector, Vector]:
-    """Do what `inverse_dynamics` does, with the base: return what acts on the whole vehicle."""
-    push, moment = inverse_dynamics(chain, motion, force, rates, turning, torques)
+    """Do what `newton_euler` does, with the base: return what acts on the whole vehicle."""
+    found = np.empty((motion.shape[1], LINK, 3))
+    push, moment = newton_euler(chain, motion, force, rates, turning, torques, found)
     centre, inertia = vector(chain.base_centre), rows(chain.base_inertia)
     own = times(chain.base_mass, plus(force, _carried(rates, turning, centre)))
     twist = plus(turned(inertia, turning), cross(rates, turned(inertia, rates)))
@@ -222,21 +210,22 @@ def vehicle_dynamics(
 def gravity_torque(
     chain: Chain, angles: np.ndarray, force: Vector, torques: np.ndarray
 ) -> tuple[Vector, Vector]:
-    """Write the joint torques (n,) [N m] that hold the arm still; return as `inverse_dynamics`.
+    """Write the joint torques (n,) [N m] that hold the arm still; return as `newton_euler`.
 
     angles (n,) [rad]; force [m/s^2]: (0, 0, g) for a level base at rest.
     """
     motion = np.zeros((3, len(angles)))
     motion[ANGLE] = angles
-    return inverse_dynamics(chain, motion, force, ORIGIN, ORIGIN, torques)
+    found = np.empty((len(angles), LINK, 3))
+    return newton_euler(chain, motion, force, ORIGIN, ORIGIN, torques, found)
 
 
 @jit
 def mass_matrix(chain: Chain, angles: np.ndarray, matrix: np.ndarray) -> None:
     """Write the inertia of the joints (n, n) [kg m^2] for a base that does not move."""
     motion = np.zeros((3, len(angles)))
-    motion[ANGLE] = angles
+    motion[ANGLE], found = angles, np.empty((len(angles), LINK, 3))
     for i in range(len(angles)):
         motion[ACCELERATION, i] = 1.0
-        inverse_dynamics(chain, motion, ORIGIN, ORIGIN, ORIGIN, matrix[i])
+        newton_euler(chain, motion, ORIGIN, ORIGIN, ORIGIN, matrix[i], found)
         motion[ACCELERATION, i] = 0.0

@@ -29,6 +29,7 @@ from uam_control.estimation.pose_filter import (
     wait,
 )
 from uam_control.maths.compiled import jit, prepared
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import record
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion, rotate_back
 from uam_control.settings.parameter_set import choice, number
@@ -131,11 +132,11 @@ class StateEstimator(Estimator):
         forget_samples(self.arrays)
         self._state, *_ = arrays_of(self.arrays.memory)
         a, sample, angles = self.arrays, np.zeros(3), np.zeros(joints)
-        self._mocap = prepared(take_mocap, a, 0.0, sample, np.zeros(4))
-        self._imu = prepared(take_imu, a, 0.0, sample, sample)
-        self._joints = prepared(take_joints, a, 0.0, angles, angles)
+        self.mocap = bound(take_mocap, a, 0.0, sample, np.zeros(4))
+        self.imu = bound(take_imu, a, 0.0, sample, sample)
+        self.joints = bound(take_joints, a, 0.0, angles, angles)
         self._write_biases = prepared(write_biases, a.pose.memory, np.empty((2, 3)))
-        self._settle, self._assemble = (prepared(f, a) for f in (settle, assemble_stored))
+        self._settle, self._assemble = bound(settle, a), bound(assemble_stored, a)
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         self.parameters = p = parameters
@@ -150,7 +151,7 @@ class StateEstimator(Estimator):
 
     @property
     def refused_poses(self) -> int:
-        self._settle(self.arrays)
+        self._settle()
         return self.arrays.pose.gate["refused"].item()
 
     @property
@@ -170,18 +171,9 @@ class StateEstimator(Estimator):
         self._write_biases(self.arrays.pose.memory, found)
         return found[0], found[1]
 
-    def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        self._mocap(self.arrays, stamp, position, quaternion)
-
-    def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
-        self._imu(self.arrays, stamp, gyro, specific_force)
-
-    def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        self._joints(self.arrays, stamp, alpha, alpha_dot)
-
     def update(self) -> np.ndarray:
-        self._settle(self.arrays)
-        self._assemble(self.arrays)
+        self._settle()
+        self._assemble()
         return self._state
 
 

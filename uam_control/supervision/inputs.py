@@ -9,7 +9,8 @@ import numpy as np
 
 from uam_control.ages import STALE
 from uam_control.estimation.pose_clock import no_pose, repeated
-from uam_control.maths.compiled import borrowing, prepared
+from uam_control.maths.compiled import borrowing
+from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import Known, Number, put, record
 from uam_control.supervision.observation import ReadingArrays, Readings
 
@@ -44,7 +45,8 @@ class InputArrays(NamedTuple):
 
 class Inputs:
     """Newest values and their stamps. Ages are differences of stamps and do not depend on the time
-    of delivery. `arrays`: what compiled functions use."""
+    of delivery. `arrays`: what compiled functions use; `mocap`, `accelerometer_bias`: `take_pose`
+    and `take_bias` of these."""
 
     _autopilot, _last = Number(), Known()
 
@@ -52,11 +54,6 @@ class Inputs:
         """period [s]: of control ticks."""
         self._period = period
         self.begin_anew()
-        a, three, places = self.arrays, np.zeros(3), np.zeros(0, dtype=int)
-        self._take_pose = prepared(take_pose, a, 0.0, three, np.zeros(4))
-        self._take_bias = prepared(take_bias, a, 0.0, three)
-        self._take_gains = prepared(take_gains, a, 0, 0.0, three, places)
-        self._take_ages = prepared(take_ages, a, 0.0)
 
     def begin_anew(self) -> None:
         """Forget all values: stamps of a new simulation follow."""
@@ -71,7 +68,12 @@ class Inputs:
     def _make_arrays(self, bias_mean: np.ndarray, newest: np.ndarray) -> None:
         r = self._readings
         known = r.memory, r.arrays, r.payload_position, r.grip
-        self.arrays = InputArrays(*known, bias_mean, newest, self.memory)
+        self.arrays = a = InputArrays(*known, bias_mean, newest, self.memory)
+        three, places = np.zeros(3), np.zeros(0, dtype=int)
+        self.mocap = bound(take_pose, a, 0.0, three, np.zeros(4))
+        self.accelerometer_bias = bound(take_bias, a, 0.0, three)
+        self._take_gains = bound(take_gains, a, 0, 0.0, three, places)
+        self._take_ages = bound(take_ages, a, 0.0)
 
     @property
     def settled(self) -> bool:
@@ -79,10 +81,6 @@ class Inputs:
         m = self.memory[0]
         known = not math.isnan(m.position + m.attitude + m.arm + m.last)
         return known and not self._gaps and self._readings.missed_ticks == 0.0
-
-    def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """See `take_pose`."""
-        self._take_pose(self.arrays, stamp, position, quaternion)
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
         """Store joint readings at `stamp` [s]; effort (n,): measured torques [N m]."""
@@ -104,10 +102,6 @@ class Inputs:
     def grip(self, grip: np.ndarray) -> None:
         """Store opening [m] and closing force [N] of fingers (2,)."""
         self._readings.grip[:] = grip
-
-    def accelerometer_bias(self, stamp: float, bias: np.ndarray) -> None:
-        """See `take_bias`."""
-        self._take_bias(self.arrays, stamp, bias)
 
     def lift(self, thrust: float, throttle: float) -> None:
         """Store the filtered collective thrust [N] and normalised thrust 0..1."""
@@ -137,7 +131,7 @@ class Inputs:
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
         """Store the adapted gains of one of SUBSYSTEMS at `stamp` [s]: names (n), values (n,)."""
         number = SUBSYSTEMS.index(subsystem)
-        self._take_gains(self.arrays, number, stamp, values, self.watched(tuple(names)))
+        self._take_gains(number, stamp, values, self.watched(tuple(names)))
 
     def watched(self, names: tuple[str, ...]) -> np.ndarray:
         """Return the places (m,) of the gains with a limit among `names`."""
@@ -161,7 +155,7 @@ class Inputs:
         while gaps and stamp - gaps[0][0] > 1.0:
             gaps.popleft()
         readings.missed_ticks = float(sum(missed for _, missed in gaps)) if gaps else 0.0
-        self._take_ages(self.arrays, stamp)
+        self._take_ages(stamp)
         return readings
 
 
