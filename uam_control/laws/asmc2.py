@@ -63,10 +63,7 @@ class Asmc2Parameters(LawParameters):
 def asmc2_step(
     record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
-    """Compute one tick of ASMC-2: write tau (n,) and advance adaptation (7,) in place.
-
-    inputs: see `LawInputs`; record: of `LawParameters.record`.
-    """
+    """Compute one tick of ASMC-2: write tau (n,) and advance adaptation (7,) in place."""
     p = record[0]
     e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs
     n = len(tau)

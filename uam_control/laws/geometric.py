@@ -59,10 +59,7 @@ class GeometricL1Parameters(GeometricParameters):
 def geometric_step(
     record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
-    """Write tau (n,), and the norm of the feedback [m/s^2 or rad/s^2] to adaptation (1,).
-
-    inputs: see `LawInputs`; record: of `LawParameters.record`.
-    """
+    """Write tau (n,), and the norm of the feedback [m/s^2 or rad/s^2] to adaptation (1,)."""
     adaptation[0] = feed_back(record[0], inputs, tau)
 
 

@@ -21,6 +21,7 @@ from uam_control.mission.mission_output import (
     LANDED,
     RELEASED,
     WAITING,
+    MagnetOverride,
     MissionOutput,
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
@@ -29,7 +30,6 @@ from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import Goal
 from uam_control.mission.pre_arm import ChecklistReport, PreArm
 from uam_control.mission.scenarios.scenario import Scenario
-from uam_control.mission.steps import MagnetOverride, Steps
 from uam_control.supervision import (
     Authority,
     Decision,
@@ -87,7 +87,7 @@ class FlightSequence:
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
         reference = self.output.reference
-        self._use(self._planned)
+        self.scenario = self._planned
         reference[:] = 0.0
         reference[CHI, ARM] = self.scenario.arm_start
         vars(self.output).update(vars(MissionOutput(reference)))
@@ -116,12 +116,6 @@ class FlightSequence:
         """Compare the reference with the limits, and hold beyond the delay that it stands."""
         self._pre_arm.check_reference(self._parameters)
         self.checks.follow(self._pre_arm.stands)
-
-    def _use(self, scenario: Scenario) -> None:
-        """Fly `scenario`."""
-        self.scenario = scenario
-        self._phases = Steps(scenario.phase, (at for at, _ in scenario.phases))
-        self._magnet = Steps(scenario.magnet_on, (at for at, _ in scenario.magnet))
 
     def begin_anew(self) -> None:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
@@ -421,7 +415,7 @@ class FlightSequence:
         start[3:5] = 0.0
         start[ARM] = self.scenario.arm_start
         self._takeoff, self._ground = stamp, start.item(Z)
-        self._use(self._planned.begun_at(start))
+        self.scenario = self._planned.begun_at(start)
         self._in_flight = Observation(self._seen.state, self.output.reference, self._ground)
         self._guidance = Guidance(
             self.scenario.trajectory(start),
@@ -455,12 +449,12 @@ class FlightSequence:
         if decision.guide is Guide.SCENARIO:
             if self._guidance.planned:
                 return GOAL
-            return self._phases.at(self._guidance.scenario_time)
+            return self.scenario.phase(self._guidance.scenario_time)
         return {Guide.STOP: HOLD, Guide.DESCEND: LAND, Guide.NOTHING: ABORTED}[decision.guide]
 
     def _scenario_magnet(self) -> bool:
         guidance = self._guidance
-        return guidance is not None and self._magnet.at(guidance.scenario_time)
+        return guidance is not None and self.scenario.magnet_on(guidance.scenario_time)
 
     def _magnet_on(self, decision: Decision) -> bool:
         """Return the overriding value until the scenario switches, else the scenario's value."""

@@ -215,7 +215,9 @@ class Mission(FlightSequence):
         until = landing.end + self._parameters.touchdown_timeout if lands else landing.at
         self.memory["takes_off"] = state is State.TAKING_OFF
         self._watch.due_from = self._watch_from
-        until = min(self._phases.until, self._magnet.until, until)
+        changes = (*self.scenario.phases, *self.scenario.magnet)
+        time = self._guidance.scenario_time
+        until = min([at for at, _ in changes if at > time] + [until])
         return self._guidance.look_ahead(stamps, until)
 
     @property

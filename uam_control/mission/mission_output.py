@@ -1,4 +1,4 @@
-"""Output of the mission at one tick, and the names of its phases."""
+"""Output of the mission at one tick, names of its phases, an operator's word on the magnet."""
 
 from dataclasses import dataclass
 
@@ -32,3 +32,33 @@ class MissionOutput:
     grasp: Grasp = Grasp.NONE
     attempt: int = 0  # number of the approach to the payload
     grasp_text: str = ""  # newest decision about the payload
+
+
+class MagnetOverride:
+    """An operator's word on the magnet, which counts until the scenario switches it next."""
+
+    def __init__(self) -> None:
+        self._given: tuple[bool, bool] | None = None  # overriding value, scenario's value then
+
+    @property
+    def given(self) -> bool:
+        """Whether there is one."""
+        return self._given is not None
+
+    def give(self, on: bool, scenario: bool) -> None:
+        """Override by `on`; scenario: its present value."""
+        self._given = on, scenario
+
+    def forget(self) -> None:
+        """Override no more."""
+        self._given = None
+
+    def value(self, desired: bool) -> bool | None:
+        """Return the overriding value, None for none; desired: the scenario's value now."""
+        if self._given is None:
+            return None
+        on, before = self._given
+        if desired != before:
+            self._given = None
+            return None
+        return on
