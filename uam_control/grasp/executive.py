@@ -6,7 +6,7 @@ leaves payload and stand upwards on the way on which it came.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -69,8 +69,17 @@ class GraspExecutive:
         self._reserve, self._too_heavy = ThrustReserve(), False  # found out
         self._shift_of_lift = np.zeros(3)  # of the path
         self.period = PERIOD  # [s] until the next step
-        doing = [step for step in Step if step is not Step.IDLE]
-        self._steps = {step: getattr(self, f"_{step.name.lower()}") for step in doing}
+        self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
+            Step.APPROACH: self._approach,
+            Step.ALIGN: self._align,
+            Step.DESCEND: self._descend,
+            Step.LIFT: self._lift,
+            Step.VERIFY: self._verify,
+            Step.RETREAT: self._retreat,
+            Step.CLIMB: self._climb,
+            Step.CARRY: self._carry,
+            Step.RELEASE: self._release,
+        }
 
     @property
     def aligns_for(self) -> GraspWindow | None:
