@@ -3,22 +3,8 @@
 All frames are parallel to the base's (FLU) while every joint is at zero. So a link needs no
 rotation of its own; an axis, a centre or an inertia has the numbers that CAD shows in that pose.
 
-How others use it:
-
-    chain = chain_of(vehicle)          # vehicle/chain_reader.py: from a vehicle's compiled MJCF
-    chain = parameters.chain()         # from a node's `ChainParameters`
-    # kinematics.py, all in the base frame
-    position, rotation = hand_pose(chain, q, DOWN)
-    hand_jacobian(chain, q, DOWN, jacobian)                    # (6, n): linear, then angular
-    centre = vehicle_centre(chain, q, DOWN)
-    # dynamics in kinematics.py
-    push, moment = newton_euler(chain, motion, force, rates, turning, torques, found)
-    push, moment = gravity_torque(chain, q, force, torques)
-    mass_matrix(chain, q, matrix)
-    carrying(chain, mass)              # the same arm with a point mass at its hand
-
-Vectors and rotations are tuples, see `maths/vectors.py`; q (n,) and what is written are arrays.
-`has_hand` is 0 for an arm without an end effector.
+A chain is that of a vehicle's compiled MJCF (`chain_of` in vehicle/chain_reader.py), or of a node's
+parameters. Vectors and rotations are tuples, see `maths/vectors.py`.
 """
 
 from dataclasses import dataclass

@@ -3,21 +3,6 @@
 It sends and receives no messages: `update` takes the autopilot's report and returns the request to
 send. The bridge and the direct engine use the same class. All times are simulation time.
 
-    WAITING    no heartbeat yet
-    STREAMING  setpoints are sent (the autopilot requires a stream before OFFBOARD)
-    OFFBOARD   the mode is requested
-    ARMING     arming is requested
-    FLYING     armed, in OFFBOARD (the phase stays without heartbeats: the stream must go on)
-    RELEASED   the autopilot left OFFBOARD, and not on our request: somebody else has control.
-               OFFBOARD is not requested. It returns by `regain` (an operator's command) or by the
-               pilot's own switch
-    DISARMING  disarming is requested
-    DISARMED   done
-    FAILED     too many attempts, taken over before arming, disarmed or rebooted in flight, killed;
-               `failure` and `reasons` say why. Only a new desired state (`set_desired`) starts
-               again: the vehicle is never armed again in the air by itself. Who takes control
-               then has it: RELEASED
-
 A kill is final: by command, by the pilot's switch, or by the autopilot's flight termination. From
 then on `stopped` is true: no setpoint with thrust is sent, and disarming is requested, also when
 the switch goes off again.
@@ -52,17 +37,22 @@ REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
 
 @plain_members
 class Phase(Enum):
-    """Phase of the sequence; the value is the text for logs."""
+    """Phase of the sequence; the value is the text for logs.
 
-    WAITING = "waiting for the autopilot"
-    STREAMING = "streaming setpoints"
+    RELEASED: the autopilot left OFFBOARD, and not on our request; it is not requested then. FAILED:
+    too many attempts, taken over before arming, disarmed or rebooted in flight, killed. The vehicle
+    is never armed again in the air by itself. Who takes control then has it: RELEASED.
+    """
+
+    WAITING = "waiting for the autopilot"  # no heartbeat yet
+    STREAMING = "streaming setpoints"  # the autopilot requires a stream before OFFBOARD
     OFFBOARD = "requesting OFFBOARD"
-    ARMING = "arming"
-    FLYING = "flying"
-    RELEASED = "released"
-    DISARMING = "disarming"
+    ARMING = "arming"  # it is requested
+    FLYING = "flying"  # armed, in OFFBOARD; also without heartbeats: the stream must go on
+    RELEASED = "released"  # somebody else has control: `regain`, or the pilot, brings it back
+    DISARMING = "disarming"  # it is requested
     DISARMED = "disarmed"
-    FAILED = "failed"
+    FAILED = "failed"  # see `failure`; only a new desired state starts again
 
 
 _BEGIN_AND_END = (

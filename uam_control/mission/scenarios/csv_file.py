@@ -1,17 +1,7 @@
 """CSV trajectories, as planners write them: times and positions, and what else is known.
 
-| columns | meaning |
-|---|---|
-| t | time [s], increasing |
-| px, py, pz | position [m, ENU] |
-| yaw, or qw, qx, qy, qz | heading [rad], or attitude (body FLU to ENU), of which yaw is used |
-| vx, vy, vz; ax, ay, az | velocity, acceleration [SI, ENU] |
-| dyaw | rate of yaw [rad/s] |
-| alpha_1 .. alpha_n | angles of all joints [rad] |
-| magnet, or gripper | 1: on from this row on, 0: off |
-
-t and the position are required. Agilicious' names p_x, q_w, v_x, a_lin_x ... mean the same; its
-body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
+The columns: docs/scenarios.md. Agilicious' names p_x, q_w, v_x, a_lin_x ... mean the same; its body
+rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
 """
 
 from pathlib import Path
@@ -47,13 +37,13 @@ from uam_control.vehicle import VehicleDescription
 AXES = "xyz"
 # group → its columns; a group is there as a whole or not at all
 GROUPS = {
-    "position": tuple(f"p{a}" for a in AXES),
-    "velocity": tuple(f"v{a}" for a in AXES),
-    "acceleration": tuple(f"a{a}" for a in AXES),
-    "quaternion": ("qw", "qx", "qy", "qz"),
-    "yaw": ("yaw",),
-    "yaw rate": ("dyaw",),
-    "magnet": ("magnet",),
+    "position": tuple(f"p{a}" for a in AXES),  # [m, ENU]
+    "velocity": tuple(f"v{a}" for a in AXES),  # [m/s]
+    "acceleration": tuple(f"a{a}" for a in AXES),  # [m/s^2]
+    "quaternion": ("qw", "qx", "qy", "qz"),  # body FLU to ENU, of which yaw is used
+    "yaw": ("yaw",),  # [rad]
+    "yaw rate": ("dyaw",),  # [rad/s]
+    "magnet": ("magnet",),  # 1: on from this row on, 0: off
 }
 OTHER_NAMES = {f"{k}_{a}": f"{k}{a}" for k in "pv" for a in AXES}
 OTHER_NAMES |= {"gripper": "magnet"}

@@ -1,12 +1,6 @@
 """From take-off to a trajectory and back: phases of their own, with bounded speed.
 
-take-off   vertically, to the height of the trajectory's first point
-transit    to that point, with yaw and arm
-run-up     if the trajectory begins with a speed: from rest to its first value, rate, ...
-trajectory
-run-out    if it ends with a speed: to rest
-return     to the take-off point; or only `stow`, the arm to its angles of the take-off
-land
+The phases: docs/scenarios.md, *Ways there and back*; where only the arm goes back, `stow`.
 """
 
 from __future__ import annotations
