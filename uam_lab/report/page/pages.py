@@ -10,7 +10,7 @@ from uam_control.settings.atomic import write_text
 from uam_lab.records.results import templates
 from uam_lab.records.results.metrics import PASSED_ON, errors
 from uam_lab.records.results.result_folder import LOG, PX4_LOG, TABLE, read_json
-from uam_lab.report.facts import flight_summary, paper, parameter_table, stability_rows
+from uam_lab.report.facts import flight_summary, paper, parameter_table
 from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.figures.panels import DrawnFlight
@@ -77,7 +77,9 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         poster=_embedded(shots[len(shots) // 2] if shots else None),  # before the video plays
         problem=rendered.problem,
         **figure_entries(directory / "figures", FIGURES),
-        stability=_stability(directory / "stability.json"),
+        stability=_json(directory / "stability.json"),
+        number=number,
+        percent=percent,
         comparison=comparison,
         no_parameters=no_parameters,
         versions=_json(directory / "versions.json"),
@@ -88,16 +90,16 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     return directory / "report.html"
 
 
-def _stability(file: Path) -> dict[str, Any] | None:
-    """Return the texts of the stability section; None without an analysis."""
-    found = _json(file)
-    if not found:
-        return None
-    return {
-        "verdict": stability_rows.verdict(found),
-        "rows": stability_rows.rows(found),
-        "caveats": stability_rows.caveats(found),
-    }
+def number(value: float | None) -> str:
+    """Return a number as text, with at least three digits."""
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if 100.0 <= abs(value) < 1e5 else f"{value:.3g}"
+
+
+def percent(fraction: float, digits: int = 1) -> str:
+    """Return a fraction in percent, as text."""
+    return f"{100.0 * fraction:.{digits}f} %"
 
 
 def _embedded(file: Path | None) -> str | None:
