@@ -6,6 +6,7 @@ import importlib
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
 from uam_control.settings.texts import visible
 from uam_lab.cli import output
@@ -18,32 +19,19 @@ OURS = "uam_"  # packages whose errors have a text of one line for the user
 LONGEST_ERROR = 2000  # [characters]
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
-# Subcommands and their modules, see `Command`. Only the module of the chosen command is imported:
-# all of them take seconds.
+# Subcommands. Only the module of the chosen one is imported: all of them take seconds.
 OPERATE = ("start", "hold", "resume", "land", "disarm", "kill", "goto", "status", "preflight")
-COMMANDS = {
-    "fly": "fly",
-    "rehearse": "rehearse",
-    **dict.fromkeys(OPERATE, "operate"),
-    "teleop": "teleop",
-    "checklist": "checklist",
-    "view": "view",
-    "profile": "profile",
-    "report": "report",
-    "compare": "compare",
-    "duel": "duel",
-    "tune": "tune",
-    "campaign": "campaign",
-    "faults": "faults",
-    "margins": "margins",
-    "budget": "budget",
-    "vehicle": "vehicle",
-    "arm": "arm",
-    "hand": "hand",
-    "identify-joint": "identify_joint",
-    "doctor": "doctor",
-    "calibrate-mocap": "calibrate_mocap",
-}
+COMMANDS = (
+    *("fly", "rehearse", *OPERATE, "teleop", "checklist", "view", "profile", "report"),
+    *("compare", "duel", "tune", "campaign", "faults", "margins", "budget"),
+    *("vehicle", "arm", "hand", "identify-joint", "doctor", "calibrate-mocap"),
+)
+
+
+def module_of(command: str) -> ModuleType:
+    """Return the module of a subcommand, see `Command`."""
+    name = "operate" if command in OPERATE else command.replace("-", "_")
+    return importlib.import_module(f"uam_lab.cli.{name}")
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -78,7 +66,7 @@ def parser(command: str = "") -> argparse.ArgumentParser:
     top.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help=text)
     commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
     for name in (command,) if command in COMMANDS else COMMANDS:
-        Command(commands, name, importlib.import_module(f"uam_lab.cli.{COMMANDS[name]}"))
+        Command(commands, name, module_of(name))
     return top
 
 

@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import matplotlib.style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from uam_control.settings import configuration
 from uam_control.settings.atomic import replacing
 
 INK = "#22303c"
@@ -32,43 +34,14 @@ Dashes = str | tuple[int, tuple[float, ...]]
 WIDTH = 9.6  # [in] of a figure; shown at about 960 pixels
 PIXELS_PER_INCH = 160
 
-SETTINGS = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.edgecolor": "#b8c0c8",
-    "axes.labelcolor": INK,
-    "axes.labelsize": 9.0,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.limits": (-5, 6),
-    "grid.color": GRID,
-    "grid.linewidth": 0.7,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.major.size": 3.0,
-    "ytick.major.size": 3.0,
-    "lines.linewidth": 1.1,
-    "lines.solid_joinstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    # names of phases, files, faults may contain "$"; formulas: see `formulas`
-    "text.parse_math": False,
-    # constant, so that the same flight gives the same bytes
-    "svg.hashsalt": "uam",
-}
+STYLE = "views/figures.mplstyle"
+COLOURED = {"text.color": INK, "axes.labelcolor": INK, "grid.color": GRID}
+COLOURED |= {"xtick.color": MUTED, "ytick.color": MUTED}
 
 
 def styled() -> AbstractContextManager[None]:
     """Return the context in which figures are drawn and saved."""
-    return mpl.rc_context(SETTINGS)
+    return mpl.style.context([configuration.path(STYLE), COLOURED])
 
 
 def flight_colour(number: int) -> str:
