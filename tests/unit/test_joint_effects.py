@@ -9,7 +9,7 @@ import pytest
 from effects_rig import flown, plant, tick
 
 from uam_sim_bridge.plant.effects.joint_effects import Gear, followed, gear_step, rigid_step
-from uam_sim_bridge.plant.engines import PlantError
+from uam_sim_bridge.plant.plant import PlantError
 
 LEVEL = np.eye(3).ravel()
 SENSING = ("propeller_vibration", "mocap_jitter", "mocap_dropouts", "arm_occlusion")

@@ -25,8 +25,8 @@ from uam_sim_bridge.plant.effects.rotor_effects import (
     thrust_ratio,
     vibrate,
 )
-from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+from uam_sim_bridge.plant.plant import PlantError
 
 LEVEL = np.eye(3).ravel()
 SENSING = ("propeller_vibration", "mocap_jitter", "mocap_dropouts", "arm_occlusion")

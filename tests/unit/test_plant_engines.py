@@ -2,8 +2,8 @@
 
 import pytest
 
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PlantError, plant_class
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, PlantError, plant_class
 
 
 def test_a_plant_is_named_or_given_as_a_class():

@@ -20,7 +20,7 @@ from uam_control.mission.scenarios.environment import PAYLOAD, default_environme
 from uam_control.mission.scenarios.scenario import STANDING
 from uam_control.vehicle import VehicleDescription, VehicleError, chain_of
 from uam_sim_bridge.plant.arm_geometry import BASE, room_below
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT
 from uam_sim_bridge.plant.surroundings import VEHICLE, Entry, distance, overlapping, shapes
 from uam_sim_bridge.plant.vehicle import Vehicle
 

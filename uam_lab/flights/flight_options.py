@@ -23,7 +23,7 @@ from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_lab.flights.node_options import SettingsError
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
 
 ENGINES = ("ros", "direct")

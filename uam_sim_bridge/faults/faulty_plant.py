@@ -25,7 +25,7 @@ from uam_sim_bridge.faults.link_faults import MavlinkCut
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Disturbance, Plant, Samples, Truth, Vehicle
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PlantError, plant_class
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, PlantError, plant_class
 
 
 def make_plant(

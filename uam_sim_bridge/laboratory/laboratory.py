@@ -36,7 +36,7 @@ from uam_sim_bridge.laboratory.person import Grip, joint_torque, wrench
 from uam_sim_bridge.laboratory.set_up import RoomBody, mistaken_chain, mistaken_room
 from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.plant import Samples, Truth, Vehicle, warm_up
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, plant_class
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, plant_class
 
 ADAPTER_LATENCY = 0.001  # [s] latency timer of the servo bus's adapter
 OWN_DELAYS = {  # those that the emulated devices have

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from uam_control.settings.parameter_set import choice, number, switch, text
 from uam_sim_bridge.laboratory.laboratory_parameters import SimulatedParameters
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, PLANTS
 
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 

@@ -1,6 +1,6 @@
 """The interface between the simulator and a physics engine.
 
-A physics engine is one class, a `Plant`. It is selected by a name of `engines.PLANTS` or as
+A physics engine is one class, a `Plant`. It is selected by a name of PLANTS or as
 "module:Class": `uam fly --plant`, parameter `plant` of the node mujoco_sim. At each control tick
 the simulator calls
 
@@ -13,7 +13,9 @@ the simulator calls
 
 from __future__ import annotations
 
+import inspect
 import math
+import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +27,14 @@ from uam_control.coordinates import ALPHA
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.plant.vehicle import Vehicle
 
+# physics engines by name; a new one is a class and a line here, or "module:Class"
+PLANTS = {"mujoco": "uam_sim_bridge.plant.mujoco_plant:MujocoPlant"}
+DEFAULT_PLANT = "mujoco"
 BROKEN = "the simulation cannot go on"
+
+
+class PlantError(ValueError):
+    """The plant does not exist; the text is one line."""
 
 
 class PhysicsError(RuntimeError):
@@ -239,3 +248,19 @@ def warm_up(spare: Plant) -> None:
         spare.sense()
         spare.truth()
         spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
+
+
+def plant_class(name: str) -> type[Plant]:
+    """Return the class of a name in PLANTS or of "module:Class"; raises PlantError."""
+    place = PLANTS.get(name, name)
+    if ":" not in place:
+        raise PlantError(
+            f"unknown plant '{name}'; there are: {', '.join(PLANTS)}, or a class as module:Class"
+        )
+    try:
+        found = pkgutil.resolve_name(place)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise PlantError(f"plant '{name}': {error}") from None
+    if not (inspect.isclass(found) and issubclass(found, Plant)) or inspect.isabstract(found):
+        raise PlantError(f"plant '{name}': a class that is a Plant with all its methods expected")
+    return found

@@ -38,8 +38,7 @@ from uam_sim_bridge.nodes.bridge_parameters import check_names
 from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.effects.pose_effects import OdometryDrift
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT
-from uam_sim_bridge.plant.plant import check_arrays
+from uam_sim_bridge.plant.plant import DEFAULT_PLANT, check_arrays
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 STILL = 1.0  # [s] without a state, from which on the reason of an end names it

@@ -16,8 +16,8 @@ import numpy as np
 from uam_control.maths.memory import Number, record
 from uam_control.settings.parameter_set import ANY_LENGTH, Bound, NamedSet, number, vector
 from uam_sim_bridge.plant.actuators import Rotors
-from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.plant.physics import Body
+from uam_sim_bridge.plant.plant import PlantError
 from uam_sim_bridge.plant.sensors import VEHICLE_POSE, Mocap, Noise
 from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 

@@ -14,7 +14,7 @@ from functools import cache
 from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
-from uam_sim_bridge.plant.engines import PlantError
+from uam_sim_bridge.plant.plant import PlantError
 
 CALM, LABORATORY, ODOMETRY = "calm", "laboratory", "odometry"
 Effects = dict[str, dict[str, float | list[float]]]  # name → parameters
