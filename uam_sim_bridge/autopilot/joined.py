@@ -17,7 +17,7 @@ from uam_control.ages import DISCONNECTED, age_by
 from uam_control.frames import swap_quaternion, swap_sample, swap_world
 from uam_control.maths.compiled import borrowing, jit, prepared
 from uam_control.maths.memory import Flag, Number, record
-from uam_control.offboard.exchange import Reported, Request
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.modes import MavResult, Severity
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
 from uam_control.setpoints.targets import RATES as RATES_ALONE
@@ -59,7 +59,7 @@ class _Received(NamedTuple):
 # of the last poll
 WHOLE = "heartbeat landed"
 # time [s]: of the autopilot's next cycle
-REAL = "now period received_at delivered heartbeat_due landed_due late_to late_from time"
+REAL = "now period heard delivered heartbeat_due landed_due late_to late_from time"
 
 
 class PortArrays(NamedTuple):
@@ -83,7 +83,7 @@ class JoinedAutopilot(FlightState):
     """
 
     _heartbeat, _landed = Flag(), Flag()
-    _now, _period, _received_at, _delivered = (Number() for _ in range(4))
+    _now, _period, heard, _delivered = (Number() for _ in range(4))
     _heartbeat_due, _landed_due, time = (Number() for _ in range(3))
 
     def __init__(
@@ -154,11 +154,7 @@ class JoinedAutopilot(FlightState):
 
     def connected(self, time: float) -> bool:
         """Whether the last message is younger than DISCONNECTED at `time` [s]."""
-        return time - self._received_at < DISCONNECTED
-
-    def silent(self, time: float) -> bool:
-        """See `AutopilotPort`."""
-        return self.loss_time < time - self._received_at < math.inf
+        return time - self.heard < DISCONNECTED
 
     def poll(self, time: float) -> None:
         """Deliver delayed messages; receive the autopilot's messages since the last call.
@@ -185,7 +181,7 @@ class JoinedAutopilot(FlightState):
             self._incoming.append((time + late, _Received(answers, texts, status, landed)))
 
     def _handle(self, time: float, received: _Received) -> None:
-        self._received_at = time
+        self.heard = time
         for request, result in received.answers:
             self.sequence.answer(request, result)
         for severity, text in received.texts:
@@ -200,15 +196,7 @@ class JoinedAutopilot(FlightState):
 
     def tick(self, time: float) -> None:
         """Send the request of the sequence, if there is one."""
-        seen = Reported(
-            self.connected(time),
-            self.armed,
-            self.mode,
-            self.intended,
-            self.failsafe,
-            self._delivered,
-            self.killed,
-        )
+        seen = self.reported(self.connected(time), self._delivered)
         request = self.sequence.update(time, seen)
         if request is not None:
             self._send(OTHER, lambda: self._command(request))
@@ -299,7 +287,7 @@ def following(due: float, interval: float, time: float) -> float:
 def ready(a: PortArrays, now: float) -> bool:
     """See `PortSteps`."""
     m = a.numbers[0]
-    silent = not (m.heartbeat or m.landed) and now - m.received_at > LINK_GAP
+    silent = not (m.heartbeat or m.landed) and now - m.heard > LINK_GAP
     return not silent and now - m.delivered <= LINK_GAP and a.late.numbers[0].others == 0
 
 
@@ -316,7 +304,7 @@ def poll(a: PortArrays, now: float) -> None:
         else:
             take_rates(a, a.late.values[row])
     if m.heartbeat or m.landed:
-        m.received_at, m.heartbeat, m.landed = now, 0, 0
+        m.heard, m.heartbeat, m.landed = now, 0, 0
 
 
 @jit

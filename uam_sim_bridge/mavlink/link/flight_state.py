@@ -7,7 +7,7 @@ mean that a pilot has control.
 
 import math
 
-from uam_control.offboard.exchange import Request
+from uam_control.offboard.exchange import Reported, Request
 from uam_control.offboard.modes import Mode
 
 SETTLING = 0.1  # s after an accepted request in which a report may be older than the answer
@@ -20,9 +20,12 @@ class FlightState:
     `landed`, `killed` (the kill switch is engaged): latest report.
 
     The part of an `AutopilotPort` that both ports have; all times are those of the ticks [s].
+    A subclass has `heard` [s]: newest message, and `loss_time`.
     """
 
     steps = None
+    heard: float
+    loss_time: float
 
     def __init__(self) -> None:
         self.mode = self.intended = Mode.UNKNOWN
@@ -30,6 +33,15 @@ class FlightState:
         self.armed_since: float | None = None
         self._mode_settles = self._arming_settles = -math.inf
         self._doubted: Mode | None = None  # reported while the mode settles
+
+    def silent(self, time: float) -> bool:
+        """See `AutopilotPort`."""
+        return self.loss_time < time - self.heard < math.inf
+
+    def reported(self, connected: bool, delivered: float) -> Reported:
+        """Return the state for the sequence; delivered [s]: see `Reported`."""
+        modes = self.mode, self.intended
+        return Reported(connected, self.armed, *modes, self.failsafe, delivered, self.killed)
 
     def settle(self, time: float) -> None:
         """Believe the mode that was reported while it settled, if no newer report denies it."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from uam_control.ages import DISCONNECTED
 from uam_control.offboard.autopilot_magnet import AutopilotMagnet
-from uam_control.offboard.exchange import Reported, Request
+from uam_control.offboard.exchange import Request
 from uam_control.offboard.modes import MavCmd, MavResult, Severity
 from uam_control.offboard.sequence import LINK_GAP, OffboardSequence
 from uam_control.setpoints.rate_thrust_map import RateThrustParameters
@@ -102,7 +102,7 @@ class OffboardLink(FlightState):
         self._texts = TextAssembler()
         self._pending: dict[int, Request] = {}
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
-        self._heard = -math.inf  # [s] newest message
+        self.heard = -math.inf
         self.alive = False
         self._told_unsigned = False
 
@@ -145,10 +145,6 @@ class OffboardLink(FlightState):
         """Return whether a heartbeat arrived in the last DISCONNECTED before `time` [s]."""
         return time - self._heartbeat_in < DISCONNECTED
 
-    def silent(self, time: float) -> bool:
-        """See `AutopilotPort`."""
-        return self.loss_time < time - self._heard < math.inf
-
     def poll(self, time: float) -> None:
         """Process all received messages at the tick `time` [s]."""
         for data in self.transport.receive():
@@ -159,7 +155,7 @@ class OffboardLink(FlightState):
                 else:
                     self.statistics.count(message.get_srcComponent(), message.get_seq())
                     self.streams.count(message.get_msgId(), time)
-                    self._heard = time
+                    self.heard = time
                     self._handle(time, message)
         self.statistics.tick(time)
 
@@ -192,9 +188,7 @@ class OffboardLink(FlightState):
             self.sequence.text(Severity.ERROR, UNSIGNED)
         connected = self.maintain(time)
         self.settle(time)
-        delivered = self.time_sync.delivered
-        reported = self.armed, self.mode, self.intended, self.failsafe, delivered, self.killed
-        seen = Reported(connected, *reported)
+        seen = self.reported(connected, self.time_sync.delivered)
         request = self.sequence.update(time, seen)
         if request is not None:
             self._request(request)
