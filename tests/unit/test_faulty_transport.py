@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from uam_control.mission import load_scenario
 from uam_sim_bridge.faults import read_schedule
-from uam_sim_bridge.faults.faulty_plant import DirectLink
+from uam_sim_bridge.faults.faulty_plant import DirectFaults
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 
@@ -107,7 +107,7 @@ def test_other_members_are_those_of_the_wrapped_transport():
 
 
 def test_the_direct_engine_skips_what_a_cut_or_corruption_loses():
-    link = DirectLink(
+    link = DirectFaults(
         read_schedule(["mavlink_cut@1+1", "mavlink_corruption@3+1:share=0.5"], SCENARIO, 1)
     )
     link.timeline.mission_at(0.0, 0.0, "take-off")

@@ -38,7 +38,7 @@ from uam_sim_bridge.autopilot.late_messages import (
     take,
 )
 from uam_sim_bridge.faults import Schedule
-from uam_sim_bridge.faults.faulty_plant import DirectLink
+from uam_sim_bridge.faults.faulty_plant import DirectFaults
 from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.plant.effects.network_delay import DelayArrays, SetpointDelay, late_at
 
@@ -99,7 +99,7 @@ class JoinedAutopilot(FlightState):
         self.motors = autopilot.motors
         self.memory = record(WHOLE, REAL)
         self.memory[0] = (*(False, False), *(-math.inf, math.inf), *(-math.inf,) * 4, 0.0, 0.0, 0.0)
-        self.link = DirectLink(Schedule())  # its faults
+        self.link = DirectFaults(Schedule())  # its faults
         self.network = network or SetpointDelay(0.0, 0.0, 0.0, 0)
         self._late, self._message = LateMessages(), np.zeros(8)
         self._arrivals = {POSE: self._pose, RATES: self._rates, OTHER: lambda deliver: deliver()}

@@ -165,16 +165,19 @@ class FaultyPlant(Plant):
         return self._physics.truth()
 
 
-class DirectLink:
-    """Decides for each message whether and how late it arrives.
+class DirectFaults:
+    """The faults of a flight in the direct engine; decides whether and how late messages arrive.
 
     It covers cuts, delays, and corruption of messages to the autopilot; `feasibility.needs_nodes`
-    lists the faults that the direct engine refuses.
+    lists the faults that the direct engine refuses. `timeline`: of the link's faults.
     """
 
-    def __init__(self, schedule: Schedule) -> None:
-        """schedule: faults of the link only."""
-        self.timeline = Timeline(schedule)
+    def __init__(self, schedule: Schedule, plant: Plant | None = None) -> None:
+        """schedule: checked by `feasibility.check`; plant: made with it, if it has faults."""
+        self.timeline = Timeline(schedule.only(LINK))
+        self._timelines = [self.timeline]
+        if isinstance(plant, FaultyPlant):
+            self._timelines.append(plant.timeline)
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
 
     def receives(self) -> bool:
@@ -194,26 +197,15 @@ class DirectLink:
         """Return the delay [s] of the next message from the autopilot."""
         return sum(one.late(self._noise) for one in self.timeline.active if one.inwards)
 
-
-class DirectFaults:
-    """Creates the link with its faults and passes plant and link the mission time."""
-
-    def __init__(self, schedule: Schedule, plant: Plant) -> None:
-        """schedule: checked by `feasibility.check`; plant: made with it."""
-        self.link = DirectLink(schedule.only(LINK))
-        self._timelines: list[Timeline] = [self.link.timeline]
-        if isinstance(plant, FaultyPlant):
-            self._timelines.append(plant.timeline)
-
     def step(self, tick: object) -> Step | None:
         """Return the compiled step of a tick that sets no time; None with faults of the link."""
-        return None if self.link.timeline.all else Step(unchanged, ())
+        return None if self.timeline.all else Step(unchanged, ())
 
     def update(self, stamp: float, time: float, phase: str) -> None:
-        """Set mission time [s] and phase of the control tick at `stamp` [s]."""
+        """Set mission time [s] and phase of the control tick at `stamp` [s], for the plant, too."""
         for timeline in self._timelines:
             timeline.mission_at(stamp, time, phase)
-        self.link.timeline.update(stamp)
+        self.timeline.update(stamp)
 
     @property
     def records(self) -> list[dict[str, Any]]:

@@ -87,7 +87,7 @@ class DirectFlight:
         if self._faults:
             more = {"step": self._faults.step, "decides": False}
             self.control.insert("bridge", "faults", self._update_faults, **more)
-            self.autopilot.link = self._faults.link
+            self.autopilot.link = self._faults
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
         self._complete = False  # every kind of sensor has delivered
