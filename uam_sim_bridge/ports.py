@@ -88,6 +88,19 @@ def bound(protocol: str, host: str, port: int, purpose: str) -> socket.socket:
     return opened
 
 
+def serial_problem(error: Exception) -> str:
+    """Return why a serial device cannot be used, from an error of pyserial or termios."""
+    number = getattr(error, "errno", None) or next(iter(error.args), None)
+    known = {
+        errno.ENOENT: "does not exist",
+        errno.EACCES: "no permission; add the user to the group dialout",
+        errno.EWOULDBLOCK: "in use by another program",
+    }
+    if isinstance(number, int):
+        return known.get(number) or os.strerror(number)
+    return " ".join(str(error).split())
+
+
 def is_discovery_port(port: int) -> bool:
     """Return whether a port of the middleware is a discovery port (RTPS 2.2, 9.6.1.1): even."""
     return port % 2 == 0

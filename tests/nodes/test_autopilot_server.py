@@ -243,7 +243,7 @@ def test_ends_with_the_simulator(flight):
         (["--sim-port", "70000"], "not a port"),
         (["--wait", "x"], "not a time"),
         (["--signing-key", "secret"], "not 64 hex digits"),
-        (["--serial", "/dev/nothing:57600"], "No such file"),
+        (["--serial", "/dev/nothing:57600"], "does not exist"),
         (["--serial", "/dev/null"], "a device and"),
         (["--serial", "/dev/null:57600", "--signing-key", "ab" * 32], "not signed"),
     ],

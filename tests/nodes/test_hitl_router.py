@@ -341,7 +341,7 @@ def test_the_router_continues_after_reconnection(wires):
     [
         (["pigeon:coop"], "allowed: udp:HOST:PORT"),
         (["serial:/dev/null:921600"], "serial device /dev/null"),
-        (["serial:/dev/nothing:921600"], "No such file"),
+        (["serial:/dev/nothing:921600"], "does not exist"),
         (["udp:127.0.0.1:9", "--wait", "0.2", "--sim-port", "1"], "no simulator at 127.0.0.1:1"),
         (["udp:127.0.0.1:9", "--hil-rate", "0"], "not a rate"),
         (["udp:127.0.0.1:9", "--instance", "x"], "not an instance number"),

@@ -35,7 +35,7 @@ def test_alone_it_waits_and_stops(start):
         (["-p", "clock:=sundial"], "clock: 'sundial' is not one of"),
         (["-p", "local_port:=99999"], "local_port"),
         (["-p", "autopilot:=pigeon"], "allowed: udp:HOST:PORT"),
-        (["-p", "autopilot:=serial:/dev/nothing:57600"], "No such file"),
+        (["-p", "autopilot:=serial:/dev/nothing:57600"], "does not exist"),
         (["-p", "autopilot:=14550"], "autopilot: 14550 is no text"),
         (["-p", "autopilot:=udp:127.0.0.1:9", "-p", "gcs:=tcp:localhost:5760"], "udp:HOST:PORT"),
         (["-p", "required_parameters:=boat"], "no px4/boat.yaml"),

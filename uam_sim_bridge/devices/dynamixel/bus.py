@@ -4,8 +4,6 @@ An answer has no number that names its instruction. After a stall of the compute
 the answer to an instruction that was given up may come in place of the next one: see `Overdue`.
 """
 
-import errno
-import os
 import termios
 import time
 from collections import deque
@@ -27,6 +25,7 @@ from uam_sim_bridge.devices.dynamixel.protocol import (
     word,
 )
 from uam_sim_bridge.devices.serial.serial_port import SerialPort
+from uam_sim_bridge.ports import serial_problem
 
 EMPTY_STATUS = 11  # bytes of a status packet without data
 FAST_HEAD = 8  # bytes of the answer to a Fast Sync Read before its first error
@@ -187,7 +186,7 @@ class DynamixelBus:
             raise
         except (OSError, termios.error, serial.SerialException, TypeError) as error:
             # pyserial raises TypeError for a port that another call has closed
-            raise BusLost(f"{self.device}: {_reason(error)}") from None
+            raise BusLost(f"{self.device}: {serial_problem(error)}") from None
 
     def ping(self, servo: int) -> int:
         """Return the model number of a servo. Raises NoAnswer, BusLost."""
@@ -336,12 +335,3 @@ def _parts(packet: Packet) -> tuple[int, int, bytes]:
 
 def _place(register: Register) -> bytes:
     return word(register.address, 2) + word(register.size, 2)
-
-
-def _reason(error: Exception) -> str:
-    number = error.args[0] if isinstance(error, termios.error) else getattr(error, "errno", None)
-    if number == errno.ENOENT:
-        return "does not exist"
-    if number == errno.EACCES:
-        return "no permission; add the user to the group dialout"
-    return os.strerror(number) if isinstance(number, int) else " ".join(str(error).split())

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import serial
 
-from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.ports import PortError, serial_problem
 
 FIRST_RETRY, LAST_RETRY = 0.1, 5.0  # s between attempts to open: first value, doubled up to last
 CHUNK = 65536  # bytes
@@ -171,7 +171,9 @@ class SerialTransport(StreamTransport):
             if absent and isinstance(error, OSError):
                 self._shut()
                 return
-            raise PortError(f"serial device {device} at {baud} baud: {_reason(error)}") from None
+            raise PortError(
+                f"serial device {device} at {baud} baud: {serial_problem(error)}"
+            ) from None
 
     def _open(self, now: float) -> bool:
         try:
@@ -192,15 +194,6 @@ class SerialTransport(StreamTransport):
 
     def _write(self, data: bytes) -> int:
         return os.write(self._opened.fileno(), data)
-
-
-def _reason(error: Exception) -> str:
-    number = getattr(error, "errno", None)
-    if number == errno.EWOULDBLOCK:
-        return "in use by another program"
-    if number:
-        return os.strerror(number)
-    return " ".join(str(error).split())
 
 
 class TcpTransport(StreamTransport):
