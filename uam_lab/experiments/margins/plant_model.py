@@ -20,7 +20,7 @@ from uam_control.setpoints.thrust_curve import inverse_curve
 from uam_lab.analysis.dynamics import Body
 from uam_lab.experiments.margins.linear import LinearBlock, delay, join
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.actuators import Rotors
+from uam_sim_bridge.plant.actuators import Rotors, rotor_step
 
 SLIDING = 0.5  # [rad/s] speed amplitude of a joint's oscillation; less friction acts beyond it
 LAG_FREQUENCY = 20.0  # [rad/s] a typical crossover of the attitude loops
@@ -147,7 +147,7 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
 
     def settled(command: float) -> float:
         for _ in range(round(1.0 / step)):
-            plant.step(np.full(count, command), output)
+            rotor_step(np.full(count, command), plant.arrays, output)
         return float(np.mean(output))
 
     command = inverse_curve(plant.constants[4], thrust / (full * np.mean(plant.efficiency)))
@@ -157,7 +157,7 @@ def rotor_model(plant: Rotors, thrust: float, step: float) -> tuple[float, float
     total = 0j
     for k in range(CYCLES * cycle):
         phase = 2.0 * math.pi * k / cycle
-        plant.step(np.full(count, command + SINE * math.sin(phase)), output)
+        rotor_step(np.full(count, command + SINE * math.sin(phase)), plant.arrays, output)
         if k >= (CYCLES - 1) * cycle:  # input and output hold during the same step
             total += np.mean(output) * np.exp(-1j * phase)
     # a sine without lag has the phase -90 degrees here
