@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from uam_control.laws.modular import ModularLaw
 from uam_control.settings.parameter_set import (
     ParameterError,
     ParameterSet,
+    by_name,
     integer,
     number,
     text,
@@ -82,3 +84,12 @@ def test_ranges_arrive_in_ros_as_they_are_written():
     assert not sent["file"].integer_range and not sent["file"].floating_point_range
     assert sent["file"].additional_constraints == "a name; empty: none"
     assert all(about.read_only for about in sent.values())
+
+
+def test_a_name_of_two_laws_is_refused():
+    class Copied(ModularLaw):
+        """A law that was copied, and not named."""
+
+    assert by_name("law", [ModularLaw]) == {"modular": ModularLaw}
+    with pytest.raises(ParameterError, match="'modular' is the name of .*ModularLaw and"):
+        by_name("law", [ModularLaw, Copied])

@@ -5,9 +5,9 @@ from typing import Any
 
 from uam_control.estimation.base import Estimator
 from uam_control.estimation.estimator import StateEstimator
-from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.parameter_set import ParameterError, by_name
 
-ESTIMATORS: dict[str, type[Estimator]] = {one.kind.estimator: one for one in (StateEstimator,)}
+ESTIMATORS: dict[str, type[Estimator]] = by_name("estimator", (StateEstimator,))
 DEFAULT = StateEstimator.kind.estimator
 
 

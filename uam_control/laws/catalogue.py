@@ -7,11 +7,11 @@ from uam_control.laws.indi import IndiLaw
 from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.modular import ModularLaw
 from uam_control.laws.whole_body import WholeBodyL1Law
-from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.parameter_set import ParameterError, by_name
 
-LAWS: dict[str, type[Law]] = {
-    law.kind.law: law
-    for law in (
+LAWS: dict[str, type[Law]] = by_name(
+    "law",
+    (
         ModularLaw,
         Asmc1Law,
         Asmc2Law,
@@ -19,8 +19,8 @@ LAWS: dict[str, type[Law]] = {
         GeometricL1Law,
         IndiLaw,
         WholeBodyL1Law,
-    )
-}
+    ),
+)
 DEFAULT = ModularLaw.kind.law
 
 

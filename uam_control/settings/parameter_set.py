@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from numbers import Integral
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -274,3 +274,26 @@ class NamedSet(ParameterSet):
         about = " ".join((cls.__doc__ or "").split()).rstrip(".")
         cls.ABOUT = about[:1].lower() + about[1:]
         dataclass(frozen=True)(cls)
+
+
+class HasKind(Protocol):
+    """A class with the class of its parameters."""
+
+    kind: ClassVar[Any]
+
+
+Named = TypeVar("Named", bound=HasKind)
+
+
+def by_name(parameter: str, classes: Iterable[type[Named]]) -> dict[str, type[Named]]:
+    """Return the classes by the default that `parameter` has in their `kind`.
+
+    Raises ParameterError for a name of two: one of them would not fly.
+    """
+    found: dict[str, type[Named]] = {}
+    for one in classes:
+        name = getattr(one.kind, parameter)
+        if (other := found.setdefault(name, one)) is not one:
+            both = " and ".join(f"{c.__module__}.{c.__name__}" for c in (other, one))
+            raise ParameterError(f"{parameter}: '{name}' is the name of {both}")
+    return found
