@@ -306,7 +306,7 @@ def test_a_matrix_of_rehearsals_refuses_what_the_lab_file_has(tmp_path, monkeypa
         (["--cable", "mocap_jump@3"], "mocap_jump: not of a cable: uam fly --fault"),
         (["--cable", "wire@3"], "unknown fault 'wire'"),
         (["--cable", "bus_unplugged@tea"], "no phase 'tea'"),
-        (["--cable", "wrong_id@start:joint=9"], "joint: 9.0 is outside 1 to 7"),
+        (["--cable", "wrong_id@start:joint=9"], "joint: 9 is outside 1 to 7"),
         (["--config", "none"], "unknown lab 'none'; there are: s500_lab"),
         (["--scenario", "none"], "unknown scenario"),
     ],
