@@ -13,11 +13,9 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
     complete_and_limit,
-    complete_effort,
     integrate,
     limit_force,
     limit_torque,
-    take_known_load,
     wash_out,
 )
 from uam_control.settings.parameter_set import ParameterError
@@ -41,8 +39,9 @@ NO_TILT_LIMIT = 1.5  # its tangent is 14
 ])  # fmt: skip
 def test_force_by_hand(tau, thrust_max, tilt_max, expected, cut):
     """With a weight of 5 N and 2 N upwards at least."""
-    limited = np.full(3, 77.0)
-    assert limit_force(np.array(tau), 5.0, 2.0, thrust_max, tilt_max, limited) == cut
+    limited, none = np.full(3, 77.0), np.zeros(3)
+    limits = ForceCompletion(none, none, none, 0.0, 0.0, 5.0, 2.0, thrust_max, tilt_max)
+    assert limit_force(np.array(tau), limits, limited) == cut
     np.testing.assert_allclose(limited, expected, atol=1e-12)
 
 
@@ -114,20 +113,6 @@ def test_a_saturated_integral_only_shrinks():
     integral = np.array([0.5, 0.5, 0.5])
     integrate(np.array([1.0, -1.0, 0.0]), np.ones(3), 0.4, True, 0.25, integral)
     np.testing.assert_allclose(integral, [0.5, 0.25, 0.4])  # the last is above a new limit
-
-
-@pytest.mark.parametrize(
-    ("loaded", "expected"), [(False, 10.0 - 1.0), (True, 10.0 - 1.0 + 3.0 - 8.0)]
-)
-def test_the_known_load_takes_the_place_of_the_feedforward(loaded, expected):
-    """inertia 2, integral 0.5 (e = 0); load 3 instead of 2 * 4."""
-    tau, integral = np.array([10.0]), np.array([0.5])
-    one, inertia = np.ones(1), np.array([2.0])
-    load, acceleration = np.array([3.0]), np.array([4.0])
-    complete_effort(0.0 * one, inertia, one, 9.0, False, 0.1, integral, tau)
-    if loaded:
-        take_known_load(load, inertia, acceleration, tau)
-    np.testing.assert_allclose(tau, expected)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])

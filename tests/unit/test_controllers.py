@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.control.output_limits import limit_force
+from uam_control.control.output_limits import ForceCompletion, limit_force
 from uam_control.laws.catalogue import LAWS, label
 from uam_control.laws.errors import attitude_errors
 from uam_control.maths.rotations import matrix_from_euler
@@ -58,8 +58,9 @@ def test_rate_error_forms_differ_by_about_twice_e_cross_rate():
 
 @given(st.tuples(*[st.floats(-200, 200)] * 3))
 def test_limited_force_is_within_thrust_and_tilt(tau):
-    out = np.zeros(3)
-    limit_force(np.array(tau), 21.6, 1.0, 36.0, 0.35, out)
+    out, none = np.zeros(3), np.zeros(3)
+    limits = ForceCompletion(none, none, none, 0.0, 0.0, 21.6, 1.0, 36.0, 0.35)
+    limit_force(np.array(tau), limits, out)
     assert 1.0 <= out[2] <= 36.0
     assert np.linalg.norm(out) <= 36.0 + 1e-9
     assert np.hypot(out[0], out[1]) <= out[2] * np.tan(0.35) + 1e-9

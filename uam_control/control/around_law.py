@@ -22,9 +22,8 @@ from uam_control.control.output_limits import (
     LONGEST_PREDICTION,
     ForceCompletion,
     complete_and_limit,
-    complete_effort,
+    integrate,
     limit_torque,
-    take_known_load,
     turn_level,
     wash_out,
 )
@@ -117,7 +116,7 @@ class ArmArrays(NamedTuple):
 
     all: ControllerArrays
     load: ArmLoad
-    inertia: np.ndarray  # (n,) see `complete_effort`, as the next three
+    inertia: np.ndarray  # (n,) [kg m^2]; the next three: see `integrate`
     gain: np.ndarray
     limit: float
     integral: np.ndarray
@@ -240,11 +239,13 @@ def end_attitude(a: AttitudeArrays) -> None:
 def end_arm(a: ArmArrays, state: np.ndarray, reference: np.ndarray, dt: float) -> None:
     """Complete the law's torques and limit them; then write goals of the servos if they are due."""
     m, errors, tau = a.all.numbers[0], a.all.errors, a.all.found
-    saturated = m.saturated != 0
-    complete_effort(errors[E, ALPHA:], a.inertia, a.gain, a.limit, saturated, dt, a.integral, tau)
-    if a.load.on:
+    integrate(errors[E, ALPHA:], a.gain, a.limit, m.saturated != 0, dt, a.integral)
+    for i in range(len(tau)):
+        tau[i] -= a.inertia[i] * a.integral[i]
+    if a.load.on:  # the known load takes the place of the law's feedforward
         arm_load(a.load, reference, reference[CHI, ALPHA:], True)
-        take_known_load(a.load.torques, a.inertia, errors[FEEDFORWARD, ALPHA:], tau)
+        for i in range(len(tau)):
+            tau[i] += a.load.torques[i] - a.inertia[i] * errors[FEEDFORWARD, ALPHA + i]
     m.saturated = limit_torque(tau, a.torque_max, a.all.tau)
     command_goals(a, state, reference, dt)
 

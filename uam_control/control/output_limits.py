@@ -159,29 +159,37 @@ class AttitudeLimits(TorqueLimits, ArmLoadParameters):
     )
 
 
+class ForceCompletion(NamedTuple):
+    """What `complete_and_limit` needs besides the tick's values."""
+
+    drag: np.ndarray  # (3,) [N s/m]
+    inertia: np.ndarray  # (3,) [kg]
+    integral_gain: np.ndarray  # see `integrate`
+    integral_limit: float  # see `integrate`
+    integral_gravity: float  # [m/s^2] gravity; 0: what is carried is no weight
+    weight: float  # [N]
+    thrust_min: float  # [N]
+    thrust_max: float  # [N]
+    tilt_max: float  # [rad]
+
+
 @borrowing
-def limit_force(
-    tau: np.ndarray,
-    weight: float,
-    thrust_min: float,
-    thrust_max: float,
-    tilt_max: float,
-    limited: np.ndarray,
-) -> bool:
+def limit_force(tau: np.ndarray, c: ForceCompletion, limited: np.ndarray) -> bool:
     """Write tau + weight e3 within the limits to limited (3,); return whether a limit acted.
 
-    tau: (3,) of eq. (8a), tau_p [N, ENU]; weight, thrust_min, thrust_max [N]; tilt_max [rad].
+    tau: (3,) of eq. (8a), tau_p [N, ENU].
     The vertical part has priority: the vehicle keeps its altitude, the horizontal part is reduced,
     but not below RESERVE. A vehicle too weak for its payload then sinks, and does not drift away.
     """
-    upward = tau[2] + weight
+    largest = c.thrust_max
+    upward = tau[2] + c.weight
     horizontal = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1])
-    kept = min(horizontal, RESERVE * thrust_max)
-    highest = math.sqrt(thrust_max * thrust_max - kept * kept)
-    limited[2] = max(min(upward, highest), thrust_min)
+    kept = min(horizontal, RESERVE * largest)
+    highest = math.sqrt(largest * largest - kept * kept)
+    limited[2] = max(min(upward, highest), c.thrust_min)
     room = min(
-        limited[2] * math.tan(tilt_max),
-        math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)),
+        limited[2] * math.tan(c.tilt_max),
+        math.sqrt(max(largest * largest - limited[2] * limited[2], 0.0)),
     )
     scale = 1.0 if horizontal <= room else room / horizontal
     limited[0] = scale * tau[0]
@@ -239,20 +247,6 @@ def integrate(
             integral[i] = min(limit, max(-limit, following))
 
 
-class ForceCompletion(NamedTuple):
-    """What `complete_and_limit` needs besides the tick's values; limits: see `limit_force`."""
-
-    drag: np.ndarray  # (3,) [N s/m]
-    inertia: np.ndarray  # (3,) [kg]
-    integral_gain: np.ndarray  # see `integrate`
-    integral_limit: float  # see `integrate`
-    integral_gravity: float  # [m/s^2] gravity; 0: what is carried is no weight
-    weight: float
-    thrust_min: float
-    thrust_max: float
-    tilt_max: float
-
-
 @borrowing
 def complete_and_limit(
     reference: np.ndarray,
@@ -278,36 +272,4 @@ def complete_and_limit(
     for i in range(len(tau)):
         own = tau[i] + c.inertia[i] * bias[i] + c.drag[i] * reference[CHI_DOT, X + i]
         tau[i] = own * heavier - c.inertia[i] * (integral[i] + bias[i])
-    return limit_force(tau, c.weight, c.thrust_min, c.thrust_max, c.tilt_max, limited)
-
-
-@borrowing
-def complete_effort(
-    e: np.ndarray,
-    inertia: np.ndarray,
-    gain: np.ndarray,
-    limit: float,
-    saturated: bool,
-    dt: float,
-    integral: np.ndarray,
-    tau: np.ndarray,
-) -> None:
-    """Add integral action to the law's torques tau (n,) [N m], in place.
-
-    inertia (n,) [kg m^2]; the others: see `integrate`.
-    """
-    integrate(e, gain, limit, saturated, dt, integral)
-    for i in range(len(tau)):
-        tau[i] -= inertia[i] * integral[i]
-
-
-@borrowing
-def take_known_load(
-    load: np.ndarray, inertia: np.ndarray, acceleration_d: np.ndarray, tau: np.ndarray
-) -> None:
-    """Put load (n,) [N m] in the place of the law's feedforward in tau (n,) [N m].
-
-    The feedforward is inertia (n,) [kg m^2] times acceleration_d (n,) [rad/s^2].
-    """
-    for i in range(len(tau)):
-        tau[i] += load[i] - inertia[i] * acceleration_d[i]
+    return limit_force(tau, c, limited)
