@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.estimator import assemble
-from uam_control.estimation.pose_filter import EstimatedMotion
+from uam_control.estimation.estimator import arrays_of, assemble
+from uam_control.estimation.pose_filter import parts_of
 from uam_control.stages.estimator_stage import PoseAge, age_at
 
 LEVEL, WEIGHT, NOTHING = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81]), np.zeros(3)
@@ -19,14 +19,17 @@ ONE = 0.5 / math.pi  # [Hz] corner of a filter whose omega is 1 rad/s
 
 def gathered(period, joints=2):
     """Assemble a state from numbers that are all different; return it and the filters."""
-    state, rates_filter = np.full((3, 6 + joints), 77.0), np.zeros((2, 3))
-    filtered = np.array([10.0, 20.0, 30.0])
-    angles = np.array([np.arange(1.0, joints + 1.0), np.arange(11.0, joints + 11.0)])
-    motion = EstimatedMotion(
-        np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), np.array([HALF, 0.0, 0.0, HALF]),
-        np.array([0.5, -1.0, 2.0]), np.array([12.0, 24.0, 36.0]), np.zeros(3), np.zeros(3),
-    )  # fmt: skip
-    assemble(motion, angles, period, 2.0 * ONE, ONE, rates_filter, filtered, state)
+    cutoffs = {"angular_acceleration_cutoff": 2.0 * ONE, "acceleration_cutoff": ONE}
+    arrays = StateEstimator(EstimatorParameters(**cutoffs), joints).arrays
+    motion, _, _ = parts_of(arrays.pose.memory)
+    state, angles, _, rates_filter, filtered = arrays_of(arrays.memory)
+    state[:], filtered[:] = 77.0, (10.0, 20.0, 30.0)
+    angles[:] = np.arange(1.0, joints + 1.0), np.arange(11.0, joints + 11.0)
+    motion.position[:], motion.velocity[:] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
+    motion.quaternion[:], motion.rates[:] = (HALF, 0.0, 0.0, HALF), (0.5, -1.0, 2.0)
+    motion.acceleration[:] = 12.0, 24.0, 36.0
+    arrays.numbers["period"] = period
+    assemble(arrays)
     return state, rates_filter, filtered
 
 

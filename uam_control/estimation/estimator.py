@@ -17,7 +17,6 @@ from uam_control.estimation.base import BaseParameters, Estimator
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step, observer_step
 from uam_control.estimation.pose_clock import settled, suspend
 from uam_control.estimation.pose_filter import (
-    EstimatedMotion,
     FilterArrays,
     allowed_bandwidth,
     begin_anew,
@@ -136,7 +135,7 @@ class StateEstimator(Estimator):
         self.imu = bound(take_imu, a, 0.0, sample, sample)
         self.joints = bound(take_joints, a, 0.0, angles, angles)
         self._write_biases = prepared(write_biases, a.pose.memory, np.empty((2, 3)))
-        self._settle, self._assemble = bound(settle, a), bound(assemble_stored, a)
+        self._settle, self._assemble = bound(settle, a), bound(assemble, a)
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         self.parameters = p = parameters
@@ -327,44 +326,19 @@ def write_biases(pose: np.ndarray, found: np.ndarray) -> None:
 
 
 @jit
-def assemble_stored(a: EstimatorArrays) -> None:
-    """Write the state into memory, see `arrays_of` and `assemble`.
+def assemble(a: EstimatorArrays) -> None:
+    """Filter the accelerations over the period of the IMU and write the state into memory.
 
     An observer's angles are those at the stamp of the IMU sample.
     """
     m = a.numbers[0]
     motion, _, _ = parts_of(a.pose.memory)
-    state, joints, _, rates_filter, acceleration = arrays_of(a.memory)
-    assemble(
-        *(motion, joints, m.period, m.angular_cutoff, m.linear_cutoff),
-        *(rates_filter, acceleration, state),
-    )
-    if m.observed and not math.isnan(m.imu_stamp):
-        late = min(max(m.imu_stamp - m.joint_stamp, -LONGEST_STEP), LONGEST_STEP)
-        for i in range(joints.shape[1]):
-            state[CHI, ALPHA + i] += late * joints[1, i]
-
-
-@jit
-def assemble(
-    motion: EstimatedMotion,
-    joints: np.ndarray,
-    period: float,
-    angular_cutoff: float,
-    linear_cutoff: float,
-    rates_filter: np.ndarray,
-    filtered: np.ndarray,
-    state: np.ndarray,
-) -> None:
-    """Filter the accelerations over `period` [s] and write the state (3, 6 + n).
-
-    joints (2, n): angles [rad] and velocities [rad/s]; cutoffs [Hz]; rates_filter (2, 3),
-    filtered (3,): states of the filters, updated.
-    """
+    state, joints, _, rates_filter, filtered = arrays_of(a.memory)
     rates = motion.rates
-    if period > 0.0:
-        derivative_step(rates, angular_cutoff, period, rates_filter, state[CHI_DDOT, ROLL:ALPHA])
-        low_pass_step(motion.acceleration, linear_cutoff, period, filtered)
+    if m.period > 0.0:
+        turning = state[CHI_DDOT, ROLL:ALPHA]
+        derivative_step(rates, m.angular_cutoff, m.period, rates_filter, turning)
+        low_pass_step(motion.acceleration, m.linear_cutoff, m.period, filtered)
     euler = euler_from_quaternion(motion.quaternion)
     for i in range(3):
         state[CHI, X + i], state[CHI, ROLL + i] = motion.position[i], euler[i]
@@ -372,3 +346,7 @@ def assemble(
         state[CHI_DDOT, X + i] = filtered[i]
     for i in range(joints.shape[1]):
         state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = joints[0, i], joints[1, i]
+    if m.observed and not math.isnan(m.imu_stamp):
+        late = min(max(m.imu_stamp - m.joint_stamp, -LONGEST_STEP), LONGEST_STEP)
+        for i in range(joints.shape[1]):
+            state[CHI, ALPHA + i] += late * joints[1, i]

@@ -11,7 +11,7 @@ from uam_control.estimation.base import BaseParameters
 from uam_control.estimation.estimator import (
     EstimatorArrays,
     arrays_of,
-    assemble_stored,
+    assemble,
     bias_known,
     complete,
     forget_samples,
@@ -207,7 +207,7 @@ def take_sample(a: StageArrays, stamp: int, gyro: np.ndarray, force: np.ndarray)
         m.waiting = not complete(a.estimator)
         if m.waiting:
             return NONE
-    assemble_stored(a.estimator)
+    assemble(a.estimator)
     judged = judge(a, arrays_of(a.estimator.memory)[0])
     if judged == DIVERGED:
         m.waiting = True
