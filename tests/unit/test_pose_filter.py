@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from uam_control.estimation.pose_filter import (
-    EstimatedMotion,
     correct,
     correct_waiting,
     filter_arrays,
@@ -30,17 +29,15 @@ TURNED = np.array([0.8, 0.36, 0.48, 0.0])
 
 def predicted(dt, gyro, force, quaternion=LEVEL, velocity=NOTHING, biases=(NOTHING, NOTHING)):
     """Predict from position (1, 2, 3); return all that it writes."""
-    position, velocity = np.array([1.0, 2.0, 3.0]), np.array(velocity)
-    quaternion, rates, acceleration = np.array(quaternion), np.zeros(3), np.zeros(3)
-    poses = np.zeros((3, 7))
-    motion = EstimatedMotion(
-        position, velocity, quaternion, rates, acceleration,
-        np.array(biases[0]), np.array(biases[1]),
-    )  # fmt: skip
-    predict(dt, GRAVITY, np.array(gyro), np.array(force), motion, poses, 1)
-    np.testing.assert_array_equal(poses[1], [*position, *quaternion])
+    arrays = filter_arrays()
+    motion, _, poses = parts_of(arrays.memory)
+    arrays.numbers["gravity"] = GRAVITY
+    motion.position[:], motion.velocity[:], motion.quaternion[:] = (1, 2, 3), velocity, quaternion
+    motion.gyro_bias[:], motion.accelerometer_bias[:] = biases
+    predict(arrays, dt, np.array(gyro), np.array(force), 1)
+    np.testing.assert_array_equal(poses[1], [*motion.position, *motion.quaternion])
     assert not poses[[0, 2]].any()
-    return position, velocity, quaternion, rates, acceleration
+    return motion[:5]
 
 
 def test_prediction_without_a_turn():
@@ -71,15 +68,12 @@ def test_prediction_turns_first_and_keeps_the_quaternion_of_unit_length():
 def test_correction_gains():
     # position, w = 2: 3w dt = .6, 3w^2 dt = 1.2, w^3 dt = .8 times (.5, -1, .25)
     # attitude, w = 3: 2w dt = .6 and w^2 dt = .9 times (.72, .96, 0)
-    position, velocity, quaternion = np.ones(3), np.zeros(3), LEVEL.copy()
-    gyro_bias, accelerometer_bias = np.zeros(3), np.zeros(3)
-    predicted = np.array([0.5, 1.0, 1.75, *LEVEL])
-    still = np.zeros(3)
-    motion = EstimatedMotion(
-        position, velocity, quaternion, still, still, gyro_bias, accelerometer_bias
-    )
-    bandwidths, measured = np.array([2.0, 3.0]), np.array([1.0, 0.0, 2.0])
-    correct(0.1, bandwidths, measured, TURNED, predicted, motion)
+    arrays = filter_arrays()
+    motion, _, _ = parts_of(arrays.memory)
+    position, velocity, quaternion, _, _, gyro_bias, accelerometer_bias = motion
+    position[:], arrays.used[:] = 1.0, (2.0, 3.0)
+    arrays.memory[-7:] = 0.5, 1.0, 1.75, *LEVEL
+    correct(arrays, 0.1, np.array([1.0, 0.0, 2.0]), TURNED)
     np.testing.assert_allclose(position, [1.3, 0.4, 1.15])
     np.testing.assert_allclose(velocity, [0.6, -1.2, 0.3])
     np.testing.assert_allclose(accelerometer_bias, [-0.4, 0.8, -0.2])
@@ -109,10 +103,12 @@ def test_the_value_at_a_stamp(stamp, at, gap, value):
 
 
 def test_what_was_predicted_since_a_stamp_is_shifted():
-    stamps, poses = np.array([3.0, 1.0, 2.0]), np.zeros((3, 7))
-    poses[:, 3] = 1.0
-    poses[:, 0] = 30.0, 10.0, 20.0
-    shift(stamps, poses, 2.0, np.array([5.0, 6.0, 7.0]), np.array([1.0, 0.5, -1.0]), TURNED)
+    arrays = filter_arrays()
+    _, stamps, poses = parts_of(arrays.memory)
+    stamps[:3], arrays.numbers["compared"] = (3.0, 1.0, 2.0), 2.0
+    poses[:3, 3] = 1.0
+    poses[:3, 0] = 30.0, 10.0, 20.0
+    shift(arrays, np.array([5.0, 6.0, 7.0]), np.array([1.0, 0.5, -1.0]), TURNED)
     # newest by (5, 6, 7); a second before by the velocity less; before `since` not at all
     np.testing.assert_allclose(poses[0], [35.0, 6.0, 7.0, *TURNED])
     np.testing.assert_allclose(poses[2], [24.0, 5.5, 8.0, *TURNED])

@@ -40,12 +40,11 @@ class Room(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """chi (m, 6 + n) of level bases; off (m, 6): BEYOND, of the base from its room, TURNED, of the
-    tool's elevation and lean from those wanted, HINGE, of the hand's hinge from its range; zeros
-    where all is met."""
+    """Level bases with their arms. Off: the base from its room (BEYOND), elevation and lean of the
+    tool from those wanted (TURNED), the hand's hinge from its range (HINGE)."""
 
-    chi: np.ndarray
-    off: np.ndarray
+    chi: np.ndarray  # (m, 6 + n)
+    off: np.ndarray  # (m, 6); zeros where all is met
 
 
 def placed(chain: Chain, wanted: np.ndarray, posture: np.ndarray, room: Room) -> Placed:

@@ -34,6 +34,8 @@ from uam_control.maths.rotations import (
     rotation_error,
 )
 
+OLDEST_MATCH = 0.02  # s, largest distance in time between a sample and a value it is compared with
+SAME = 1e-6  # s, between stamps of the same moment: the unit of MAVLink
 HISTORY = 256  # stored predictions: BRIDGED at 250 Hz
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
 FIRST = 0.05  # s, interval that the first correction counts for
@@ -141,9 +143,8 @@ def predict_next(
     m = a.numbers[0]
     row = m.count % HISTORY
     m.count += 1
-    motion, stamps, poses = parts_of(a.memory)
-    stamps[row] = stamp
-    predict(dt, m.gravity, gyro, specific_force, motion, poses, row)
+    parts_of(a.memory)[1][row] = stamp
+    predict(a, dt, gyro, specific_force, row)
     correct_waiting(a)
 
 
@@ -223,7 +224,7 @@ def correct_stored(
     if since > LATE:
         correct_late(a, since, dt, position, quaternion)
     else:
-        correct(dt, a.used, position, quaternion, predicted, motion)
+        correct(a, dt, position, quaternion)
 
 
 @jit
@@ -231,37 +232,27 @@ def correct_late(
     a: FilterArrays, since: float, dt: float, position: np.ndarray, quaternion: np.ndarray
 ) -> None:
     """Correct as `correct` does, and what was predicted in the `since` [s] after the exposure."""
-    motion, stamps, poses = parts_of(a.memory)
+    motion, _, _ = parts_of(a.memory)
     place, speed, turn = motion.position.copy(), motion.velocity.copy(), motion.quaternion.copy()
-    correct(dt, a.used, position, quaternion, a.memory[-POSE:], motion)
+    correct(a, dt, position, quaternion)
     for i in range(3):
         motion.position[i] += since * (motion.velocity[i] - speed[i])
-    shift(
-        stamps,
-        poses,
-        a.numbers[0].compared,
-        motion.position - place,
-        motion.velocity - speed,
-        quaternion_multiply(turn * CONJUGATE, motion.quaternion),
-    )
+    turn = quaternion_multiply(turn * CONJUGATE, motion.quaternion)
+    shift(a, motion.position - place, motion.velocity - speed, turn)
 
 
 @jit
 def shift(
-    stamps: np.ndarray,
-    poses: np.ndarray,
-    since: float,
-    displacement: np.ndarray,
-    velocity: np.ndarray,
-    turn: np.ndarray,
+    a: FilterArrays, displacement: np.ndarray, velocity: np.ndarray, turn: np.ndarray
 ) -> None:
-    """Apply the correction found for the stamp `since` [s] to all later predictions.
+    """Apply the correction found for the prediction that was compared to all later ones.
 
     Otherwise each delayed pose would cause the same correction again, and the observer would
-    oscillate. stamps (m,) [s]; poses (m, 7): position and quaternion; displacement (3,) [m]: of the
-    newest prediction; velocity (3,) [m/s]: change since `since`; turn (4,): rotation in the body.
+    oscillate. displacement (3,) [m]: of the newest prediction; velocity (3,) [m/s]: change since
+    that one; turn (4,): rotation in the body.
     """
-    newest = np.max(stamps)
+    _, stamps, poses = parts_of(a.memory)
+    newest, since = np.max(stamps), a.numbers[0].compared
     for row in range(len(stamps)):
         if stamps[row] >= since:
             for i in range(3):
@@ -271,18 +262,10 @@ def shift(
 
 @jit
 def predict(
-    dt: float,
-    gravity: float,
-    gyro: np.ndarray,
-    specific_force: np.ndarray,
-    motion: EstimatedMotion,
-    poses: np.ndarray,
-    row: int,
+    a: FilterArrays, dt: float, gyro: np.ndarray, specific_force: np.ndarray, row: int
 ) -> None:
-    """Advance the estimate in place by dt [s]; write position and quaternion into poses[row] (7,).
-
-    gravity [m/s^2]; gyro (3,), specific_force (3,): see `predict_next`.
-    """
+    """Advance the estimate by dt [s], see `predict_next`; store its pose in a row."""
+    motion, _, poses = parts_of(a.memory)
     position, velocity, quaternion, rates, acceleration, gyro_bias, accelerometer_bias = motion
     pose = poses[row]
     for i in range(3):
@@ -291,7 +274,7 @@ def predict(
     norm = np.sqrt(np.sum(turned * turned))
     quaternion[:] = turned / norm
     force = rotate(matrix_from_quaternion(quaternion), specific_force)
-    force[Z] -= gravity
+    force[Z] -= a.numbers[0].gravity
     for i in range(3):
         acceleration[i] = force[i] - accelerometer_bias[i]
         position[i] += dt * velocity[i] + 0.5 * dt * dt * acceleration[i]
@@ -302,37 +285,28 @@ def predict(
 
 @jit
 def correct(
-    dt: float,
-    bandwidths: np.ndarray,
-    measured_position: np.ndarray,
-    measured_quaternion: np.ndarray,
-    predicted: np.ndarray,
-    motion: EstimatedMotion,
+    a: FilterArrays, dt: float, measured_position: np.ndarray, measured_quaternion: np.ndarray
 ) -> None:
-    """Correct the estimate in place with a measured pose and its prediction (7,).
+    """Correct the estimate with a measured pose, see `wait`, by the prediction that is compared.
 
-    Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude.
-    dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s];
-    measured_position (3,) [m, world]; measured_quaternion (4,) body → world [w x y z].
+    Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude,
+    with the bandwidths w in use. dt [s]: since the last correction.
     """
+    motion, _, _ = parts_of(a.memory)
     position, velocity, quaternion, _, _, gyro_bias, accelerometer_bias = motion
-    w = bandwidths[0]
+    predicted, w = a.memory[-POSE:], a.used[0]
     for i in range(3):
         innovation = measured_position[i] - predicted[i]
         position[i] += 3.0 * w * dt * innovation
         velocity[i] += 3.0 * w * w * dt * innovation
         accelerometer_bias[i] -= w * w * w * dt * innovation
-    w = bandwidths[1]
+    w = a.used[1]
     error = rotation_error(measured_quaternion, predicted[TURN:])
     quaternion[:] = quaternion_multiply(
         quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error)
     )
     for i in range(3):
         gyro_bias[i] -= w * w * dt * error[i]
-
-
-OLDEST_MATCH = 0.02  # s, largest distance in time between a sample and a value it is compared with
-SAME = 1e-6  # s, between stamps of the same moment: the unit of MAVLink
 
 
 @jit

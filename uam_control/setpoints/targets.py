@@ -105,13 +105,10 @@ class PositionTarget(NamedTuple):
 
 
 class WrenchTarget(NamedTuple):
-    """One setpoint of the autopilot's allocation.
+    """One setpoint of the autopilot's allocation."""
 
-    torque (3,): normalised, -1..1, FRD; thrust: normalised collective, 0..1.
-    """
-
-    torque: np.ndarray
-    thrust: float
+    torque: np.ndarray  # (3,) normalised, -1..1, FRD
+    thrust: float  # normalised collective, 0..1
     body_rates = NO_RATES
 
     def refused(self) -> str:

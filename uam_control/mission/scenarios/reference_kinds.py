@@ -37,13 +37,10 @@ AT_REST = 1, 2, 3  # derivatives that are zero at both ends
 
 @dataclass(frozen=True)
 class Middle:
-    """Pose about which a trajectory is flown: chi (6 + n,), angles of the arm included.
+    """Pose about which a trajectory is flown."""
 
-    joints: ranges (low, high) of the joints [rad].
-    """
-
-    chi: np.ndarray
-    joints: tuple[tuple[float, float], ...]
+    chi: np.ndarray  # (6 + n,), angles of the arm included
+    joints: tuple[tuple[float, float], ...]  # ranges (low, high) [rad]
 
 
 def keys_of(kind: str) -> tuple[str, ...]:

@@ -52,13 +52,10 @@ class Landing:
 
 @dataclass(frozen=True)
 class Grip:
-    """Pick and drop along a trajectory, in its own time [s].
+    """Pick and drop along a trajectory, in its own time [s]."""
 
-    switches: (begin, on) of the magnet; rests: the moves between rests of its coordinates.
-    """
-
-    switches: tuple[tuple[float, bool], ...]
-    rests: tuple[Move, ...]
+    switches: tuple[tuple[float, bool], ...]  # (begin, on) of the magnet
+    rests: tuple[Move, ...]  # between rests of its coordinates
 
     def timed(self, begin: float = 0.0, factor: float = 1.0) -> Grip:
         """Return the grip `factor` times as slow, in a time that is `begin` [s] at the begin."""
