@@ -39,14 +39,6 @@ class InfeasibleReference(ScenarioError):
     """A reference that exceeds a limit; the text is one line: what, which limit, when."""
 
 
-class _Planned:
-    """A flight from the origin: its times (m,) [s], and trajectory."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario, self.trajectory = scenario.from_origin()
-        self.times = np.arange(0.0, self.scenario.landing.end, STEP)
-
-
 @dataclass(frozen=True)
 class Feasibility:
     """The check of references for one vehicle with its limits."""
@@ -66,17 +58,18 @@ class Feasibility:
 
         A flight of many hours is computed in parts, so that its memory is bounded.
         """
-        flight, turn = _Planned(scenario), 0.0
+        (begun, trajectory), turn = scenario.from_origin(), 0.0
+        times = np.arange(0.0, begun.landing.end, STEP)
         found: dict[tuple, Excess] = {}
         legs: dict[str, dict[tuple, Excess]] = {RUN_UP: {}, TRAJECTORY: {}, RUN_OUT: {}}
-        for begin in range(0, len(flight.times), PART):
+        for begin in range(0, len(times), PART):
             part = slice(max(begin - BESIDE, 0), begin + PART + BESIDE)
-            demand = self._planned(flight, part)
+            demand = self.needs.along(trajectory, times[part], self.carried(begun, times[part]))
             demand = demand.within(slice(begin - part.start, begin - part.start + PART))
             turn = max(turn, float(demand.turn.max()))
             if not self._collect(demand, STANDING, found):
                 continue
-            phases = np.array([flight.scenario.phase(time) for time in demand.times])
+            phases = np.array([begun.phase(time) for time in demand.times])
             for leg, excesses in legs.items():
                 if (phases == leg).sum() > 1:
                     self._collect(demand.within(phases == leg), STANDING, excesses)
@@ -267,11 +260,6 @@ class Feasibility:
             return _slowed(replace(self, reserve=self.limits.retime_reserve), scenario)
         except InfeasibleReference:
             return _slowed(self, scenario)
-
-    def _planned(self, flight: _Planned, part: slice) -> Demand:
-        """Return what a part of a flight needs."""
-        times = flight.times[part]
-        return self.needs.along(flight.trajectory, times, self.carried(flight.scenario, times))
 
     def carried(self, scenario: Scenario, times: np.ndarray) -> np.ndarray:
         """Return the carried mass (m,) [kg] at times (m,) [s]."""

@@ -68,13 +68,12 @@ class Plan:
         """The plans of base and arm, which begin and end together; itself, if it is one of them."""
         if self.columns is not BOTH:
             return (self,)
-        return tuple(
-            Plan(
-                *(self._stamp, self._times, self._points[:, :, part], self._blend.of_part(part)),
-                *(self._goal, part),
-            )
-            for part in (BASE, ARM)
-        )
+        found = []
+        for part in (BASE, ARM):
+            blend = replace(self._blend, start=self._blend.start[:, part])
+            motion = self._stamp, self._times, self._points[:, :, part]
+            found.append(Plan(*motion, blend, self._goal, part))
+        return tuple(found)
 
     @property
     def end(self) -> float:
@@ -143,10 +142,6 @@ class Blend:
         speed = float(np.linalg.norm(reference[CHI_DOT, POSITION])) if columns != ARM else 0.0
         length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
         return cls(reference[: CHI_DDOT + 1, columns].copy(), length)
-
-    def of_part(self, columns: slice) -> Blend:
-        """Return that of some of the columns."""
-        return replace(self, start=self.start[:, columns])
 
     @property
     def stop(self) -> np.ndarray:

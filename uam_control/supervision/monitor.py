@@ -37,10 +37,7 @@ class Monitor:
 
     @property
     def largest(self) -> float:
-        """Return the largest value since the limit of the current level was exceeded.
-
-        The value itself may have returned below the limit, but not below the hysteresis.
-        """
+        """See the class; the value itself may be below the limit, but not below the hysteresis."""
         return self._largest[self.level - 1] if self.level else self.value
 
     @property

@@ -11,7 +11,7 @@ from uam_control.coordinates import CHI, Z, coordinates
 from uam_control.grasp.windows import Approach
 from uam_control.mission.motion.polynomials import Polynomials, joined
 from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
-from uam_control.mission.scenarios.route import PAUSE, SINK, TRAJECTORY, Leg, Route
+from uam_control.mission.scenarios.route import PAUSE, SINK, TRAJECTORY, Route
 from uam_control.mission.scenarios.scenario_options import LAND
 
 LONGEST = 86400.0  # [s] of a flight: more than that are times in another unit
@@ -119,7 +119,14 @@ class Scenario:
         """Return the scenario with the phases and the landing of a take-off at chi (6 + n,)."""
         if self.route is None or self.route_at is not None:
             return self
-        return routed(self, self.route.flight(start))
+        legs = self.route.flight(start)
+        begins = np.append(0.0, np.cumsum([leg.path.length for leg in legs])).tolist()
+        phases = tuple((begin, leg.phase) for begin, leg in zip(begins, legs, strict=False))
+        landing = Landing(begins[-2] + PAUSE, begins[-1] - begins[-2] - PAUSE)
+        found = replace(self, phases=phases, landing=landing)
+        if self.grip is None:
+            return found
+        return replace(found, magnet=self.grip.timed(found.trajectory_begins).switches)
 
     def from_origin(self) -> tuple[Scenario, Trajectory]:
         """Return scenario and reference of a take-off at the origin, with the arm of its start."""
@@ -218,14 +225,3 @@ def standing(arm_start: tuple[float, ...]) -> np.ndarray:
     chi[Z] = STANDING
     chi[len(chi) - len(arm_start) :] = arm_start
     return chi
-
-
-def routed(scenario: Scenario, legs: tuple[Leg, ...]) -> Scenario:
-    """Return the scenario with phases and landing of `legs`."""
-    begins = np.append(0.0, np.cumsum([leg.path.length for leg in legs])).tolist()
-    phases = tuple((begin, leg.phase) for begin, leg in zip(begins, legs, strict=False))
-    landing = Landing(begins[-2] + PAUSE, begins[-1] - begins[-2] - PAUSE)
-    found = replace(scenario, phases=phases, landing=landing)
-    if scenario.grip is None:
-        return found
-    return replace(found, magnet=scenario.grip.timed(found.trajectory_begins).switches)

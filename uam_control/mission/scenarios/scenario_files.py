@@ -97,7 +97,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
         raise entry.error("duration", f"{landing.duration:g} s is below {SHORTEST:g} s")
     scenario = Scenario(
         name=file.stem,
-        description=_description(top),
+        description=top.text("description", default=""),
         arm_start=arm_start,
         phases=phases or ((0.0, "flight"),),
         landing=landing,
@@ -140,7 +140,7 @@ def _along_route(
         route = Route(legs(entry, _middle(start, vehicle)), end, options)
     scenario = Scenario(
         name=file.stem,
-        description=_description(top),
+        description=top.text("description", default=""),
         arm_start=arm_start,
         phases=(),
         landing=Landing(0.0, 0.0),
@@ -238,10 +238,6 @@ def _approach(entry: Section) -> Approach:
         raise entry.error("direction", "[0, 0, 0]: the way of the tool to the payload, x y z")
     point = entry.numbers("point", 3, default=usual.point)
     return Approach(tuple((way / np.linalg.norm(way)).tolist()), point)
-
-
-def _description(top: Section) -> str:
-    return top.text("description", default="")
 
 
 def _timeline(
