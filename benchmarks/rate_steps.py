@@ -26,7 +26,7 @@ from uam_lab.flights.processes.processes import NodeFailed, Processes
 from uam_lab.records.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_lab.report.figures import style
 from uam_sim_bridge.ports import PortError, Reservation
-from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation, required
 
 STAND_IN, PX4 = "stand-in", "PX4"
 STAND_IN_MODULE, SITL_MODULE = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
@@ -119,7 +119,7 @@ def main() -> int:
         epilog="example: .venv/bin/python benchmarks/rate_steps.py --px4-dir "
         "~/PX4-Autopilot/build/px4_sitl_default --out results/rate-steps",
     )
-    parser.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
+    parser.add_argument("--px4-dir", metavar="DIR", help=required(VARIABLE))
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="result folder (default results/<time>-rate-steps)"
     )
