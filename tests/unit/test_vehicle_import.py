@@ -275,6 +275,13 @@ def test_each_joint_may_have_a_servo_of_its_own(tmp_path):
         imported(tmp_path, drone(), answers=Answers({"servo": "XM430-W210," * 2 + "XM430-W210"}))
 
 
+def test_an_arm_too_heavy_for_every_servo_is_told(tmp_path):
+    made, _ = imported(tmp_path, drone(mass=20.0, length=0.5))
+    text = "\n".join(made.missing)
+    assert "joint_0: outstretched it needs" in text
+    assert "type XM540-W270, the strongest; none holds" in text
+
+
 def stl(size):
     """A tetrahedron."""
     corners = size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)

@@ -181,7 +181,8 @@ def servos_for(parts: Parts, answers: Answers, mass: float) -> Servos:
         if share * one["stall_torque"] >= need and one["mode"] == CURRENT_SERVO
     ]
     usual = fitting[0] if fitting else list(types)[-1]
-    why = f"the smallest that holds {need:.2f} N m with {share:.0%} of its stall torque"
+    which = "the smallest that holds" if fitting else "the strongest; none holds"
+    why = f"{which} {need:.2f} N m with {share:.0%} of its stall torque"
     told = answers.each("servo", usual, why, types, len(parts.joints))
     stall = tuple(types[name]["stall_torque"] for name in told.value)
     for joint, name, needed, most in zip(parts.joints, told.value, needs, stall, strict=True):
