@@ -1,13 +1,14 @@
 """What `uam fly` and `uam rehearse` print at the end of a flight."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 
 from uam_lab.cli import rehearse
 from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED, fly, tell
 from uam_lab.flights.library.flight_result import FlightResult
-from uam_lab.flights.processes.interrupts import INTERRUPTED
+from uam_lab.flights.processes.interrupts import INTERRUPTED, StopRequest
 from uam_lab.records.results.outcome import Outcome, complete
 from uam_lab.records.results.result_folder import ResultFolder
 from uam_lab.records.results.terminal import Terminal
@@ -34,6 +35,33 @@ def test_the_reason_goes_to_the_errors_and_the_rest_to_the_output(
     assert said.out.count("note: ") == len(outcome.notes)
     failed = "uam rehearse: arm_driver was killed\n  | last words\n"
     assert said.err == (failed if outcome.failure else "")
+
+
+class Pressed(StopRequest):
+    """Ctrl-C, `presses` times in the flight."""
+
+    presses = 1
+
+    def __enter__(self):
+        self.count = self.presses
+        return self
+
+    def __exit__(self, *exception):
+        pass
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_a_second_ctrl_c_leaves_out_the_report(tmp_path, monkeypatch, presses):
+    result = FlightResult(tmp_path, {}, Outcome(None, interrupted=True))
+    flight = MagicMock(result=result, folder=tmp_path)
+    told = []
+    monkeypatch.setattr(Pressed, "presses", presses)
+    monkeypatch.setattr("uam_lab.cli.fly.Interrupts", Pressed)
+    monkeypatch.setattr("uam_lab.cli.fly.Flight", lambda **_: flight)
+    monkeypatch.setattr("uam_lab.cli.fly.tell", lambda *given: told.append(given))
+    settings = SimpleNamespace(scenario=SimpleNamespace(landing=SimpleNamespace(end=1.0)))
+    fly(settings, video=True, report=True)
+    assert told[0][5] is (presses == 1) and len(result.outcome.notes) == presses - 1
 
 
 def test_a_rehearsal_ends_as_a_flight():

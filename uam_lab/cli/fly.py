@@ -161,7 +161,11 @@ def fly(
         flight = Flight(checked=settings, observer=progress, stop=stop, flown_by=engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()
-    return tell(console, settings, flight.result, name, video, report, further(flight.folder))
+    result, folder = flight.result, flight.folder
+    if report and stop.impatient and result.metrics is not None:
+        report = False
+        result.outcome.notes.append(f"no report after a second Ctrl-C: uam report {folder}")
+    return tell(console, settings, result, name, video, report, further(folder))
 
 
 def tell(
