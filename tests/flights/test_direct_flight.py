@@ -11,6 +11,8 @@ import pytest
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_control.supervision import Event
+from uam_lab.experiments.trials.outcome import ending
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
@@ -171,3 +173,18 @@ def test_px4s_own_position_control_flies_the_lemniscate_late_but_safely():
     error = series.block("truth.")[:, :3] - series.block("reference.")[:, :3]
     rmse = np.sqrt(np.mean(np.sum(error[series.in_phase("trajectory")] ** 2, axis=1)))
     assert 0.06 < rmse < 0.2  # PX4's cascade lags; the law: 0.002 m
+
+
+@pytest.mark.parametrize(("seed", "drift"), [(1, -0.23), (9, 0.27)])
+def test_the_ground_is_found_where_an_odometry_shows_it_higher_or_lower(seed, drift):
+    """Lower: the vehicle would wait for a touchdown in vain; higher: it would fall from there."""
+    effects = presets.read(["odometry"], ["odometry_drift:jumps=0.5,jump=0.3"])
+    a_flight = flight("hover", payload=0.0, seed=seed, **presets.added({}, effects))
+    a_flight.run()
+    series = a_flight.recording.series()
+    landed = np.argmax(series.in_phase("landed"))
+    off = series["estimate.z"] - series["truth.z"]
+    assert off[landed] == pytest.approx(drift, abs=0.03)
+    assert a_flight.mission.changes[-1].event is Event.TOUCHDOWN
+    assert series["truth.z"][landed] - series["truth.z"][0] < 0.01
+    assert ending(series).impact < 0.5

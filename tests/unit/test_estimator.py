@@ -172,3 +172,21 @@ def test_age_of_poses_at_their_arrival():
     age.restart()
     age_at(age.memory, 2_000_000_000)  # without a new pose
     assert age.largest == 0
+
+
+def test_the_noise_of_an_odometry_moves_the_velocity_less():
+    """6 mm at 60 Hz; what passes to the velocity grows with the bandwidth to the power of 1.5."""
+    noise = np.random.default_rng(1).normal(0.0, 0.006, (600, 3))
+    found = []
+    for of_odometry in (False, True):
+        estimator = started(position_bandwidth=12.0, odometry_bandwidth=6.0)
+        if of_odometry:
+            estimator.use_odometry()
+        velocities = []
+        for tick in range(1, 2401):
+            if tick % 4 == 0:
+                estimator.mocap(tick / 240.0, [1.0, 2.0, 3.0] + noise[tick // 4 - 1], LEVEL)
+            estimator.imu(tick / 240.0, NOTHING, WEIGHT)
+            velocities.append(estimator.update()[1, :3].copy())
+        found.append(np.std(velocities[480:]))
+    assert found[1] == pytest.approx(found[0] / 2.0**1.5, rel=0.25)

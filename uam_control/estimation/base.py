@@ -41,6 +41,9 @@ class Estimator:
         """Use `parameters` (validated) from the next sample on."""
         self.parameters = parameters
 
+    def use_odometry(self) -> None:
+        """The poses are those of an odometry: noisier than a motion capture's."""
+
     def forget(self) -> None:
         """Begin anew; parameters stay."""
         raise NotImplementedError

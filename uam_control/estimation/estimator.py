@@ -53,6 +53,9 @@ class EstimatorParameters(BaseParameters):
     attitude_bandwidth: float = number(
         8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
     )
+    odometry_bandwidth: float = number(
+        6.0, "largest correction of position and attitude by an odometry", "rad/s", 0.5, 60.0
+    )
     pose_gate: float = number(
         0.15, "jump of the motion capture from which its poses are rejected", "m", 0.05, 1000.0
     )
@@ -127,6 +130,7 @@ class StateEstimator(Estimator):
         memory = np.zeros(FIXED + PER_JOINT * joints)
         readings = np.zeros((READINGS, 1 + 2 * joints))
         self.arrays = EstimatorArrays(filter_arrays(), memory, readings, self.memory)
+        self._odometry = False
         self.set_parameters(parameters)
         forget_samples(self.arrays)
         self._state, *_ = arrays_of(self.arrays.memory)
@@ -140,13 +144,19 @@ class StateEstimator(Estimator):
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         self.parameters = p = parameters
         pose, m = self.arrays.pose, self.memory[0]
-        bandwidths = p.position_bandwidth, p.attitude_bandwidth
-        pose.bandwidths[:] = *bandwidths, max(bandwidths)
+        position, attitude = p.position_bandwidth, p.attitude_bandwidth
+        if self._odometry:
+            position, attitude = (min(one, p.odometry_bandwidth) for one in (position, attitude))
+        pose.bandwidths[:] = position, attitude, max(position, attitude)
         pose.gate["distance"], pose.numbers["gravity"] = p.pose_gate, p.gravity
         m.angular_cutoff, m.linear_cutoff = p.angular_acceleration_cutoff, p.acceleration_cutoff
         m.joint_bandwidth, m.velocity_weight = p.joint_bandwidth, p.joint_velocity_weight
         m.observed, m.observer_bandwidth = p.joint_velocity == OBSERVER, p.joint_observer_bandwidth
-        m.joint_cutoff, m.bandwidth = p.joint_acceleration_cutoff, p.position_bandwidth
+        m.joint_cutoff, m.bandwidth = p.joint_acceleration_cutoff, position
+
+    def use_odometry(self) -> None:
+        self._odometry = True
+        self.set_parameters(self.parameters)
 
     @property
     def refused_poses(self) -> int:

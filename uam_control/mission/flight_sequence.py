@@ -11,7 +11,14 @@ from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.grasp import Grasp, GraspDecision
 from uam_control.maths.compiled import prepared
 from uam_control.maths.memory import Number, record
-from uam_control.mission.ground import GroundPose, Standing, Touchdown, on_ground
+from uam_control.mission.ground import (
+    GroundPose,
+    Standing,
+    Touchdown,
+    carried,
+    on_ground,
+    seek_ground,
+)
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_output import (
     ABORTED,
@@ -79,6 +86,7 @@ class FlightSequence:
         self._on_ground = prepared(on_ground, self.output.reference, 0.0, 0.0, 0.0)
         self._age = 0.0  # [s] of the newest state: one tick
         self._resumed = -math.inf  # stamp [s] of the first tick after a gap
+        self._odometry = False
         self._seen: Observation | None = None
         checklist = self._start.require_checklist
         self._pre_arm = PreArm(scenario, checklist, vehicle, compared)
@@ -116,6 +124,10 @@ class FlightSequence:
         """Compare the reference with the limits, and hold beyond the delay that it stands."""
         self._pre_arm.check_reference(self._parameters)
         self.checks.follow(self._pre_arm.stands)
+
+    def use_odometry(self) -> None:
+        """The poses are those of an odometry: the height of the ground in its frame drifts."""
+        self._odometry = True
 
     def begin_anew(self) -> None:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
@@ -208,6 +220,8 @@ class FlightSequence:
             decision = self._supervisor.step(stamp, seen, None if moved else command)
             if guidance is not None:
                 guidance.write(stamp)
+                if self._odometry and decision.state is State.LANDING:
+                    seek_ground(output.reference, self._since_arrival(stamp))
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
                     guidance.stay(stamp, state, self._ground, self._age)
@@ -285,11 +299,22 @@ class FlightSequence:
         seen.landing_due = time >= landing.at and not planned and guidance.goes_on
         seen.arrived = planned and guidance.arrived(stamp)
         if time >= landing.half or touchdown.late_in_descent(stamp):
-            seen.touchdown = touchdown.at_rest(stamp, seen.on_ground, p)
+            if self._odometry:
+                stands = carried(state, self.output.reference, p.touchdown_speed)
+            else:
+                stands = seen.on_ground
+            seen.touchdown = touchdown.at_rest(stamp, stands, p)
         seen.overdue = (
             time > landing.end + p.touchdown_timeout or stamp > guidance.end + p.touchdown_timeout
         )
         return seen
+
+    def _since_arrival(self, stamp: float) -> float:
+        """Return for how long [s] the reference of a landing has been at its end."""
+        guidance = self._guidance
+        if self._touchdown.late_in_descent(stamp):
+            return stamp - guidance.end
+        return guidance.scenario_time - self.scenario.landing.end
 
     def watch_payload(self) -> None:
         """Step the executive of the grasps while the scenario is flown; the end of a `step`."""

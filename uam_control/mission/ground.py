@@ -9,6 +9,8 @@ from uam_control.maths.compiled import borrowing
 from uam_control.mission.mission_output import DRY_RUN, HAND_CHECK, MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters
 
+SEEKING = 0.2  # [m/s] downwards, of a reference that seeks the ground
+BEHIND = 0.25  # [m] of a vehicle above such a reference: the ground carries it
 SINKING, STILL = 0.2, 0.05  # [m/s] downwards: a landing, and the end of it
 
 
@@ -53,6 +55,25 @@ def on_ground(state: np.ndarray, ground: float, height: float, speed: float) -> 
     state (3, 6 + n); ground [m]: its height; height [m], speed [m/s]: of `touchdown`.
     """
     return state[CHI, Z] < ground + height and abs(state[CHI_DOT, Z]) < speed
+
+
+def seek_ground(reference: np.ndarray, since: float) -> None:
+    """Let a reference (3, 6 + n) go on downwards that has been at its end `since` [s].
+
+    Where the frame of the poses has drifted the ground is lower, or higher, than at take-off.
+    """
+    if since > 0.0:
+        reference[CHI, Z] -= SEEKING * since
+        reference[CHI_DOT, Z] -= SEEKING
+
+
+def carried(state: np.ndarray, reference: np.ndarray, speed: float) -> bool:
+    """Return whether the vehicle does not follow a descent, so that something carries it.
+
+    state, reference (3, 6 + n); speed [m/s]: that counts as at rest.
+    """
+    behind = state[CHI, Z] - reference[CHI, Z]
+    return bool(behind > BEHIND and abs(state[CHI_DOT, Z]) < speed)
 
 
 class Standing:

@@ -212,7 +212,8 @@ class Mission(FlightSequence):
         """
         landing, state = self.scenario.landing, self.output.state
         lands = state is State.LANDING
-        until = landing.end + self._parameters.touchdown_timeout if lands else landing.at
+        wait = 0.0 if self._odometry else self._parameters.touchdown_timeout
+        until = landing.end + wait if lands else landing.at
         self.memory["takes_off"] = state is State.TAKING_OFF
         self._watch.due_from = self._watch_from
         changes = (*self.scenario.phases, *self.scenario.magnet)

@@ -136,7 +136,9 @@ class MissionNode(UamNode):
         self._joints = len(vehicle.joints)
         self._writer = ReferenceWriter(self._joints)
         self.errors = TrackingErrors(self)
-        MissionInputs(self, self.stage.inputs, vehicle.joint_names)
+        inputs = MissionInputs(self, self.stage.inputs, vehicle.joint_names)
+        if inputs.poses.odometry:
+            self._mission.use_odometry()
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         if start.require_checklist:
             self.listen(topics.CHECKLIST, self._on_checklist, required=False)

@@ -61,9 +61,9 @@ class MissionInputs:
         self._names = list(joints)
         self._node = node
         self._supervisor, self._inputs = supervisor, supervisor.inputs
-        self._poses = PoseSource(node)
-        read = self._poses.read  # the supervisor refuses a pose that the estimator cannot use
-        self._keep(self._poses.topic, lambda message: supervisor.mocap(*read(message)))
+        self.poses = PoseSource(node)
+        read = self.poses.read  # the supervisor refuses a pose that the estimator cannot use
+        self._keep(self.poses.topic, lambda message: supervisor.mocap(*read(message)))
         self._keep(topics.PAYLOAD, lambda data: supervisor.payload(*read_pose(data)))
         self._keep(topics.THRUST, self._on_thrust, stamp_of)
         self._keep(topics.IMU_BIAS, self._on_imu_bias, stamp_of)

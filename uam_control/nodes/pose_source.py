@@ -15,18 +15,18 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 
 
 class PoseSource:
-    """Reads poses by the node's parameter `pose_source`; `topic`: theirs."""
+    """Reads poses by the node's parameter `pose_source`; `topic`: theirs; `odometry`: whether they are one's."""
 
     def __init__(self, node: Node) -> None:
         chosen = NodeParameters(node, PoseSourceParameters, read_only=True).current.pose_source
-        self._odometry = chosen == ODOMETRY
-        self.topic = topics.ODOMETRY_IN if self._odometry else topics.MOCAP
+        self.odometry = chosen == ODOMETRY
+        self.topic = topics.ODOMETRY_IN if self.odometry else topics.MOCAP
         self._body = frame(node, topics.BODY)
         self._anchor, self._told = PoseAnchor(), 0
 
     def read(self, message: Any) -> tuple[int, np.ndarray, np.ndarray]:
         """Return (stamp [ns], position (3,) [m], quaternion (4,) [w x y z]); raise BadMessage."""
-        if not self._odometry:
+        if not self.odometry:
             return read_pose(message)
         stamp, *pose = read_odometry(message, self._body)
         return stamp, *self._anchor(stamp / SECOND, *pose)

@@ -76,6 +76,8 @@ class StateEstimatorNode(UamNode):
         self._odometry_period = round(SECOND / rate)  # [ns]
         self._odometry_at = 0  # [ns] stamp of the last odometry
         self.poses = PoseSource(self)
+        if self.poses.odometry:
+            self.stage.estimator.use_odometry()
         self._mocap = self.listen(self.poses.topic, self._on_mocap)
         self._joints = self.listen(
             topics.JOINTS, lambda data: self.stage.joints(*read_joints(data, self._names))

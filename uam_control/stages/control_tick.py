@@ -81,6 +81,9 @@ class ControlTick:
         poses are those of one, whose jumps are taken out in the tick, see `PoseAnchor`."""
         self.anchor, self.odometry = PoseAnchor(), odometry
         self.estimator, self.mission = estimator, mission
+        if odometry:
+            estimator.estimator.use_odometry()
+            mission.mission.use_odometry()
         self.hand, self.bridge = hand, bridge
         self.position, self.attitude, self.arm = laws
         whole = self.arm.controller.law.whole
