@@ -15,7 +15,10 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 
 
 class PoseSource:
-    """Reads poses by the node's parameter `pose_source`; `topic`: theirs; `odometry`: whether they are one's."""
+    """Reads poses by the node's parameter `pose_source`.
+
+    `topic`: theirs; `odometry`: whether they are those of an odometry.
+    """
 
     def __init__(self, node: Node) -> None:
         chosen = NodeParameters(node, PoseSourceParameters, read_only=True).current.pose_source
