@@ -12,7 +12,7 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.supervision import Event
-from uam_lab.experiments.trials.outcome import ending
+from uam_lab.experiments.trials.outcome import COMPLETED, classify, ending
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
@@ -188,3 +188,4 @@ def test_the_ground_is_found_where_an_odometry_shows_it_higher_or_lower(seed, dr
     assert a_flight.mission.changes[-1].event is Event.TOUCHDOWN
     assert series["truth.z"][landed] - series["truth.z"][0] < 0.01
     assert ending(series).impact < 0.5
+    assert classify(series, {"mission_completed": True}) == COMPLETED

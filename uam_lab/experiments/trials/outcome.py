@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.mission.mission_output import LAND
 from uam_control.supervision import State
 from uam_lab.records.results.timeseries import Series
 from uam_sim_bridge.plant.plant import BROKEN
@@ -118,9 +119,17 @@ def down_after(series: Series, begun: float) -> float | None:
 
 
 def _down_early(series: Series) -> bool:
-    """Return whether the vehicle reached the ground in flight while the desired height was up."""
+    """Return whether the vehicle reached the ground in flight while the desired height was up.
+
+    In a landing the desired height counts from the estimate: the frame of an odometry drifts.
+    """
     height = series["truth.z"] - series["truth.z"][0]
     desired = series["reference.z"] - series["truth.z"][0]
     been_up = np.maximum.accumulate(height) > NEAR_GROUND
     down = been_up & (height < HEIGHT) & series.flown
-    return bool(down.any()) and bool(desired[np.argmax(down)] > NEAR_GROUND)
+    if not down.any():
+        return False
+    first = np.argmax(down)
+    if series.in_phase(LAND)[first]:
+        desired = desired + series["truth.z"] - series["estimate.z"]
+    return bool(desired[first] > NEAR_GROUND)
