@@ -50,22 +50,15 @@ _REST_TIME = 0.2  # s, time constant of the bias of a vehicle that stands
 
 
 class EstimatorArrays(NamedTuple):
-    """The state of the filter.
+    """The state of the filter. Without the bias a descent without vision would climb or fall."""
 
-    estimate (10,). bias (3,): of the acceleration, NED [m/s^2], estimated from vision; without it a
-    descent without vision would climb or fall. mean_force (3,) [m/s^2, FRD]: low-pass filtered
-    specific force for the check before arming. past (HISTORY, 7): attitude and position of the last
-    samples; stamps (HISTORY,) [s]. vision_down (3,): vertical axis of the newest pose, FRD. numbers
-    (1,): row of the newest sample; number and time [s] of the vision poses.
-    """
-
-    estimate: np.ndarray
-    bias: np.ndarray
-    mean_force: np.ndarray
-    past: np.ndarray
-    stamps: np.ndarray
-    vision_down: np.ndarray
-    numbers: np.ndarray
+    estimate: np.ndarray  # (10,)
+    bias: np.ndarray  # (3,) of the acceleration [m/s^2, NED], estimated from vision
+    mean_force: np.ndarray  # (3,) [m/s^2, FRD] low-pass filtered, for the check before arming
+    past: np.ndarray  # (HISTORY, 7) attitude and position of the last samples
+    stamps: np.ndarray  # (HISTORY,) [s]
+    vision_down: np.ndarray  # (3,) vertical axis of the newest pose, FRD
+    numbers: np.ndarray  # (1,) row of the newest sample; number and time [s] of the vision poses
 
 
 @jit

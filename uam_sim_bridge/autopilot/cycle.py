@@ -36,19 +36,15 @@ SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
 class RateLoop(NamedTuple):
-    """Parameters, state and output of the rate loop.
+    """Parameters, state and output of the rate loop."""
 
-    model_factor: THR_MDL_FAC; filters (7,), gains (5, 3), memory (7, 3): see `rate_control`; mixer
-    (rotors, 4) and its pseudo-inverse, inverse (4, rotors); motors (rotors,): output, 0..1.
-    """
-
-    model_factor: float
-    filters: np.ndarray
-    gains: np.ndarray
-    mixer: np.ndarray
-    inverse: np.ndarray
-    memory: np.ndarray
-    motors: np.ndarray
+    model_factor: float  # THR_MDL_FAC
+    filters: np.ndarray  # (7,) see `rate_control`
+    gains: np.ndarray  # (5, 3) see `rate_control`
+    mixer: np.ndarray  # (rotors, 4)
+    inverse: np.ndarray  # (4, rotors) pseudo-inverse of the mixer
+    memory: np.ndarray  # (7, 3) see `rate_control`
+    motors: np.ndarray  # (rotors,) output, 0..1
 
 
 @borrowing

@@ -63,16 +63,15 @@ REAL = "now period heard delivered heartbeat_due landed_due late_to late_from ti
 
 
 class PortArrays(NamedTuple):
-    """State of a `JoinedAutopilot`. numbers (1,): see WHOLE, REAL; gyro, force (3,): newest sample,
-    FRD; message: for one that is sent."""
+    """State of a `JoinedAutopilot`."""
 
-    numbers: np.ndarray
+    numbers: np.ndarray  # (1,) see WHOLE, REAL
     autopilot: CycleArrays
-    gyro: np.ndarray
-    force: np.ndarray
+    gyro: np.ndarray  # (3,) newest sample, FRD
+    force: np.ndarray  # (3,) the same
     network: DelayArrays
     late: LateArrays
-    message: np.ndarray
+    message: np.ndarray  # for one that is sent
 
 
 class JoinedAutopilot(FlightState):

@@ -19,13 +19,12 @@ POSE, RATES, OTHER = range(3)
 
 
 class LateArrays(NamedTuple):
-    """due (WAITING,) [s], kinds (WAITING,), values (WAITING, VALUES): of the messages, in a ring;
-    numbers (1,): its first row, count, and how many of them are OTHER."""
+    """The messages that wait, in a ring."""
 
-    due: np.ndarray
-    kinds: np.ndarray
-    values: np.ndarray
-    numbers: np.ndarray
+    due: np.ndarray  # (WAITING,) [s]
+    kinds: np.ndarray  # (WAITING,)
+    values: np.ndarray  # (WAITING, VALUES)
+    numbers: np.ndarray  # (1,) first row of the ring, count, and how many of them are OTHER
 
 
 class LateMessages:

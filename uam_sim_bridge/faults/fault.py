@@ -28,28 +28,21 @@ class Fault(NamedSet):
 
 @dataclass
 class PlantCommands:
-    """Commands of a period: motors (n_rotors,) 0..1, effort (n_joints,) [N m], magnet on or off.
+    """Commands of a period. The arrays are copies; a fault may change them."""
 
-    The arrays are copies; a fault may change them.
-    """
-
-    motors: np.ndarray
-    effort: np.ndarray
-    magnet: bool
+    motors: np.ndarray  # (n_rotors,) 0..1
+    effort: np.ndarray  # (n_joints,) [N m]
+    magnet: bool  # on or off
 
 
 @dataclass
 class Occurrence:
-    """A fault of the plant between its begin and its end.
+    """A fault of the plant between its begin and its end."""
 
-    noise: generator of this fault, seeded per flight; begun: tick of the begin; since [s]: time
-    since then; memory: what the fault keeps from tick to tick, None at the begin.
-    """
-
-    noise: np.random.Generator
-    begun: int = 0
-    since: float = 0.0
-    memory: Any = None
+    noise: np.random.Generator  # of this fault, seeded per flight
+    begun: int = 0  # tick of the begin
+    since: float = 0.0  # [s] since the begin
+    memory: Any = None  # what the fault keeps from tick to tick
 
     def done(self, over: float) -> float:
         """Return the part 0..1 of a transition of `over` [s] that is done."""

@@ -43,15 +43,12 @@ SUFFIXES = (".yaml", ".yml")
 
 @dataclass(frozen=True)
 class TimedFault:
-    """A fault from mission time `at` [s] for `duration` [s]; inf: until the end of the flight.
-
-    at FROM_START: from the first tick on. phase: from its begin `at` counts; "": from take-off.
-    """
+    """A fault of a flight and its time."""
 
     fault: Fault
-    at: float
-    duration: float = math.inf
-    phase: str = ""
+    at: float  # [s] mission time; FROM_START: from the first tick on
+    duration: float = math.inf  # [s]; inf: until the end of the flight
+    phase: str = ""  # from its begin `at` counts; "": from take-off
 
     @property
     def entry(self) -> dict[str, Any]:

@@ -12,15 +12,12 @@ TOLERANCE = 1e-6  # s; stamps are whole microseconds
 
 @dataclass
 class FaultState:
-    """State of a fault; begin, end: mission times [s], None before they occur.
-
-    begin of a fault from the start: 0.
-    """
+    """State of a fault in a flight."""
 
     planned: TimedFault
     number: int
-    begin: float | None = None
-    end: float | None = None
+    begin: float | None = None  # [s] mission time, 0 for one from the start; None: not yet
+    end: float | None = None  # [s] mission time; None: not yet
 
     @property
     def fault(self) -> Fault:

@@ -40,13 +40,10 @@ LET_GO = 1.5  # [s] on the floor before the hands are off, and after
 
 @dataclass
 class Grip:
-    """Where the hands want the vehicle: pose (6,) x y z roll pitch yaw [m, rad, ENU], and joints.
+    """Where the hands want the vehicle."""
 
-    pose None: the hands are off; joints (n,) [rad] None: the hands are off the arm.
-    """
-
-    pose: np.ndarray | None = None
-    joints: np.ndarray | None = None
+    pose: np.ndarray | None = None  # (6,) x y z roll pitch yaw [m, rad, ENU]; None: hands off
+    joints: np.ndarray | None = None  # (n,) [rad]; None: hands off the arm
 
 
 def wrench(grip: Grip, state: np.ndarray, weight: float) -> tuple[np.ndarray, np.ndarray]:
@@ -83,16 +80,13 @@ def eased(share: float) -> float:
 
 @dataclass
 class Leg:
-    """A motion of the grip to `pose` and `joints` in `duration` [s], then `hold` [s].
+    """A motion of the grip, which is then held."""
 
-    None: as before; off: the hands let go.
-    """
-
-    duration: float
-    hold: float
-    pose: np.ndarray | None = None
-    joints: np.ndarray | None = None
-    off: bool = False
+    duration: float  # [s]
+    hold: float  # [s]
+    pose: np.ndarray | None = None  # as in `Grip`; None: as before
+    joints: np.ndarray | None = None  # (n,) [rad]; None: as before
+    off: bool = False  # the hands let go
 
 
 class Person:

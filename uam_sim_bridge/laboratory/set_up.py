@@ -26,15 +26,12 @@ from uam_sim_bridge.faults.schedule import Schedule
 
 @dataclass
 class RoomBody:
-    """A rigid body of the server; other_axis: streamed with the other upward axis.
-
-    turn [rad]: the nose pointed so far to the left of the calibration's when the body was made.
-    """
+    """A rigid body of the server."""
 
     name: str
     calibration: Calibration
-    other_axis: bool = False
-    turn: float = 0.0
+    other_axis: bool = False  # streamed with the other upward axis
+    turn: float = 0.0  # [rad] nose so far to the left of the calibration's when the body was made
 
     def seen(
         self, position: np.ndarray, quaternion: np.ndarray

@@ -17,16 +17,14 @@ COUNTS_PER_TURN = 4096
 
 
 class RotorArrays(NamedTuple):
-    """constants (5,): thrust coefficient, full thrust [N], then a, b, c of T / full thrust = a +
-    b u + c u^2; gains (2, rotors): share of the difference per step while speeding up and slowing
-    down; efficiency (rotors,): factor on thrust; their state: speed (rotors,) [rad/s], thrust
-    (rotors,) [N]."""
+    """Rotors. constants: thrust coefficient, full thrust [N], then a, b, c of T / full thrust = a +
+    b u + c u^2."""
 
-    constants: np.ndarray
-    gains: np.ndarray
-    efficiency: np.ndarray
-    speed: np.ndarray
-    thrust: np.ndarray
+    constants: np.ndarray  # (5,)
+    gains: np.ndarray  # (2, rotors) part of the difference per step, speeding up and slowing down
+    efficiency: np.ndarray  # (rotors,) factor on thrust
+    speed: np.ndarray  # (rotors,) [rad/s] state
+    thrust: np.ndarray  # (rotors,) [N] state
 
 
 class Rotors:
@@ -73,16 +71,15 @@ def rotor_step(commands: np.ndarray, a: RotorArrays, output: np.ndarray) -> None
 
 
 class ServoArrays(NamedTuple):
-    """command (n,): see `Servos`; constants (3, n): stall torque [N m], no-load speed [rad/s],
-    torque of one current unit [N m]; loop (4,): duty per count of position error, largest duty,
-    count [rad], whether the servos are in position control; torque (n,) [N m]; waiting (latency,
-    n): commands on their way, exchanged in turns, one at each control tick."""
+    """Joints. constants: stall torque [N m], no-load speed [rad/s], torque of one current unit
+    [N m]; loop: duty per count of position error, largest duty, count [rad], whether the servos are
+    in position control."""
 
-    command: np.ndarray
-    constants: np.ndarray
-    loop: np.ndarray
-    torque: np.ndarray
-    waiting: np.ndarray
+    command: np.ndarray  # (n,) see `Servos`
+    constants: np.ndarray  # (3, n)
+    loop: np.ndarray  # (4,)
+    torque: np.ndarray  # (n,) [N m]
+    waiting: np.ndarray  # (latency, n) commands on their way, exchanged in turns, one at each tick
 
 
 class Servos:

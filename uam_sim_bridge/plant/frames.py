@@ -18,18 +18,14 @@ BASE_LINK = "base_link"  # REP-105's name of the base
 
 @dataclass(frozen=True)
 class Frame:
-    """Pose of a body in the frame of its parent; `name`: of its link in the URDF.
+    """Pose of a body in the frame of its parent."""
 
-    position (3,) [m]; quaternion (4,) [w x y z], body → parent, with the joint at 0; axis (3,):
-    unit vector of the hinge, or of a finger's slide; joint: its name, "" for a fixed body.
-    """
-
-    name: str
+    name: str  # of its link in the URDF
     parent: str
-    position: np.ndarray
-    quaternion: np.ndarray
-    axis: np.ndarray
-    joint: str = ""
+    position: np.ndarray  # (3,) [m]
+    quaternion: np.ndarray  # (4,) [w x y z] body → parent, with the joint at 0
+    axis: np.ndarray  # (3,) unit vector of the hinge, or of a finger's slide
+    joint: str = ""  # its name; "": a fixed body
     slides: bool = False
 
     def moved(self, joint: float) -> tuple[np.ndarray, np.ndarray]:

@@ -84,8 +84,7 @@ def write_state(o: Body, state: np.ndarray) -> None:
 
 
 class PlantArrays(NamedTuple):
-    """State of a `MujocoPlant`. samples (m, 8 + 3 n): of IMU, joints and gripper, in a ring by the
-    tick at which they were taken, taken (m,); numbers (1,): see WHOLE, REAL."""
+    """State of a `MujocoPlant`."""
 
     body: Body
     truth: TruthRow
@@ -93,9 +92,9 @@ class PlantArrays(NamedTuple):
     gusts: NoiseArrays
     mocap: MocapArrays
     effects: EffectArrays
-    samples: np.ndarray
-    taken: np.ndarray
-    numbers: np.ndarray
+    samples: np.ndarray  # (m, 8 + 3 n) of IMU, joints and gripper, in a ring by their tick
+    taken: np.ndarray  # (m,) tick at which they were taken
+    numbers: np.ndarray  # (1,) see WHOLE, REAL
 
 
 # steps: of the physics in a period; model_at, data_at: addresses of MuJoCo's structures; gusty:

@@ -19,51 +19,40 @@ from uam_sim_bridge.plant.magnet import pull_fraction
 
 
 class Body(NamedTuple):
-    """The vehicle and its surroundings, as arrays that never move; most are views into MuJoCo's.
-
-    position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
-    FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
-    [m/s^2, ENU] and angular [rad/s^2, FLU]. sensed_force (3,) [m/s^2, FLU]: specific force of a
-    physics step, specific_force: the mean of a control period. thrust_control: see `rotor_step`;
-    torque_control: see `joint_step`. force (3,) [N, ENU]: on the base; drag (3,) [N s/m]; wind,
-    wind_mean (3,) [m/s], gust_keep (1,): see `blow`. payload (7,): position [m] and quaternion;
-    face, payload_centre, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,):
-    part of the holding force; swing (1,) [rad]: angle of the magnet's pivot. finger_ends to
-    grip_force: of `Fingers`. imu_bias (6,): [rad/s, m/s^2]; encoder_units (2,): see `quantised`.
-    """
+    """The vehicle and its surroundings, as arrays that never move; most are views into MuJoCo's."""
 
     rotors: RotorArrays
     servos: ServoArrays
-    position: np.ndarray
-    quaternion: np.ndarray
-    velocity: np.ndarray
-    rates: np.ndarray
-    alpha: np.ndarray
-    alpha_dot: np.ndarray
-    base_acceleration: np.ndarray
-    alpha_ddot: np.ndarray
-    sensed_force: np.ndarray
-    specific_force: np.ndarray
-    thrust_control: np.ndarray
-    torque_control: np.ndarray
-    force: np.ndarray
-    drag: np.ndarray
-    wind: np.ndarray
-    wind_mean: np.ndarray
-    gust_keep: np.ndarray
-    payload: np.ndarray
-    face: np.ndarray
-    payload_centre: np.ndarray
-    payload_axes: np.ndarray
-    gap_constants: np.ndarray
-    magnet_control: np.ndarray
-    swing: np.ndarray
-    finger_ends: np.ndarray
-    finger_goal: np.ndarray
-    opening: np.ndarray
-    grip_force: np.ndarray
-    imu_bias: np.ndarray
-    encoder_units: np.ndarray
+    position: np.ndarray  # (3,) [m, ENU]
+    quaternion: np.ndarray  # (4,) [w x y z], FLU → ENU
+    velocity: np.ndarray  # (3,) [m/s, ENU]
+    rates: np.ndarray  # (3,) [rad/s, FLU]
+    alpha: np.ndarray  # (n,) [rad]
+    alpha_dot: np.ndarray  # (n,) [rad/s]
+    base_acceleration: np.ndarray  # (6,) linear [m/s^2, ENU] and angular [rad/s^2, FLU]
+    alpha_ddot: np.ndarray  # (n,) [rad/s^2]
+    sensed_force: np.ndarray  # (3,) [m/s^2, FLU] specific force of a physics step
+    specific_force: np.ndarray  # (3,) [m/s^2, FLU] the mean of a control period
+    thrust_control: np.ndarray  # see `rotor_step`
+    torque_control: np.ndarray  # see `joint_step`
+    force: np.ndarray  # (3,) [N, ENU] on the base
+    drag: np.ndarray  # (3,) [N s/m]
+    wind: np.ndarray  # (3,) [m/s] see `blow`
+    wind_mean: np.ndarray  # (3,) [m/s] see `blow`
+    gust_keep: np.ndarray  # (1,) see `blow`
+    payload: np.ndarray  # (7,) position [m] and quaternion
+    face: np.ndarray  # see `pull_fraction`
+    payload_centre: np.ndarray  # see `pull_fraction`
+    payload_axes: np.ndarray  # see `pull_fraction`
+    gap_constants: np.ndarray  # see `pull_fraction`
+    magnet_control: np.ndarray  # (1,) part of the holding force
+    swing: np.ndarray  # (1,) [rad] angle of the magnet's pivot
+    finger_ends: np.ndarray  # of `Fingers`
+    finger_goal: np.ndarray  # of `Fingers`
+    opening: np.ndarray  # of `Fingers`
+    grip_force: np.ndarray  # of `Fingers`
+    imu_bias: np.ndarray  # (6,) [rad/s, m/s^2]
+    encoder_units: np.ndarray  # (2,) see `quantised`
 
 
 @borrowing

@@ -51,25 +51,19 @@ class PhysicsError(RuntimeError):
 class Samples:
     """Sensor samples that arrive at one tick; each is None or a tuple with its stamp [s] first.
 
-    The arrays are contiguous, of float64.
-
-    imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, of the companion computer.
-    joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
-    position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
-    the autopilot's own sensors. imu_copies: messages with this IMU sample. payload: as mocap, of
-    the payload's grip point, the middle of its upper side. grip: (stamp, (2,)): opening [m] and
-    closing force [N] of a two-finger gripper. earlier: poses that arrive at the same
-    tick as mocap, in order, exposed before it.
+    The arrays are contiguous, of float64. A pose is (stamp, position (3,) [m, ENU], quaternion (4,)
+    [w x y z], FLU → ENU). The payload's is that of its grip point, the middle of its upper side.
+    imu: of the companion computer.
     """
 
-    imu: tuple | None
-    joints: tuple | None
-    mocap: tuple | None
-    hil: tuple
-    imu_copies: int = 1
-    payload: tuple | None = None
-    grip: tuple | None = None
-    earlier: Sequence[tuple] = ()
+    imu: tuple | None  # (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU
+    joints: tuple | None  # (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m])
+    mocap: tuple | None  # pose of the vehicle
+    hil: tuple  # as imu, without delay, for the autopilot's own sensors
+    imu_copies: int = 1  # messages with this IMU sample
+    payload: tuple | None = None  # pose of the payload
+    grip: tuple | None = None  # (stamp, (2,)) opening [m], force [N] of a two-finger gripper
+    earlier: Sequence[tuple] = ()  # poses that arrive with mocap, in order, exposed before it
 
     @property
     def poses(self) -> Sequence[tuple]:
@@ -93,34 +87,26 @@ def check_arrays(arrays: Sequence[np.ndarray]) -> None:
 
 @dataclass
 class Truth:
-    """True values, hidden from the controllers; SI, ENU.
+    """True values, hidden from the controllers; SI, ENU."""
 
-    state (3, 6 + n): as in uam_control.coordinates; quaternion, payload_quaternion (4,) [w x y z],
-    FLU → ENU; payload_position (3,) [m]; magnet_force [N]; magnet_swing [rad]; rotor_speed
-    (rotors,) [rad/s]; rotor_thrust (rotors,) [N]; grip: opening [m] and force [N] of fingers.
-    """
-
-    state: np.ndarray
-    quaternion: np.ndarray
-    payload_position: np.ndarray
-    payload_quaternion: np.ndarray
-    magnet_force: float
-    magnet_swing: float
-    rotor_speed: np.ndarray
-    rotor_thrust: np.ndarray
-    grip: Sequence[float] = (math.nan, math.nan)
+    state: np.ndarray  # (3, 6 + n) as in uam_control.coordinates
+    quaternion: np.ndarray  # (4,) [w x y z] FLU → ENU
+    payload_position: np.ndarray  # (3,) [m]
+    payload_quaternion: np.ndarray  # (4,) [w x y z] FLU → ENU
+    magnet_force: float  # [N]
+    magnet_swing: float  # [rad]
+    rotor_speed: np.ndarray  # (rotors,) [rad/s]
+    rotor_thrust: np.ndarray  # (rotors,) [N]
+    grip: Sequence[float] = (math.nan, math.nan)  # opening [m] and force [N] of fingers
 
 
 class TruthRow(NamedTuple):
-    """Where the true values of one tick begin in a flat row (width,) of float64; see `Truth`.
+    """Where the true values of one tick begin in a flat row (width,) of float64; see `Truth`."""
 
-    state: row by row; rotor_thrust; payload: position and quaternion; magnet: force, swing; grip.
-    """
-
-    state: int
+    state: int  # row by row
     rotor_thrust: int
-    payload: int
-    magnet: int
+    payload: int  # position and quaternion
+    magnet: int  # force, swing
     grip: int
     width: int
 
@@ -145,17 +131,14 @@ class TruthRow(NamedTuple):
 class Disturbance:
     """Changes of the physics by faults during one period; see `none`.
 
-    rotor_parts (rotors,): factor on the thrust of each rotor; joint_friction (n,) [N m]: dry
-    friction added to each joint; magnet_part: factor on the holding force; wind (3,) [m/s, ENU]:
-    added; payload_swing [rad/s]: initial pitch rate of a payload that hangs from one point of the
-    magnet while the magnet is on; None: the payload lies flat on the magnet.
+    A payload with a swing hangs from one point of the magnet while the magnet is on.
     """
 
-    rotor_parts: np.ndarray
-    joint_friction: np.ndarray
-    wind: np.ndarray
-    magnet_part: float = 1.0
-    payload_swing: float | None = None
+    rotor_parts: np.ndarray  # (rotors,) factor on the thrust of each rotor
+    joint_friction: np.ndarray  # (n,) [N m] dry friction added to each joint
+    wind: np.ndarray  # (3,) [m/s, ENU] added
+    magnet_part: float = 1.0  # factor on the holding force
+    payload_swing: float | None = None  # [rad/s] initial pitch rate; None: it lies flat
 
     @classmethod
     def none(cls, rotors: int, joints: int) -> Disturbance:

@@ -87,21 +87,18 @@ class Imu:
 
 
 class MocapArrays(NamedTuple):
-    """Of a `Mocap`. taken (2, POSE): newest pose of vehicle and payload, see `take_pose`; due (2,
-    WAITING) [ticks] and poses (2, WAITING, POSE): of those that have not arrived, in rings;
-    first, count, arrived (2,): of the rings; arrived: how many at this tick, the rows before first.
-    grip (3,) [m]: the payload's; numbers (1,): see REAL."""
+    """Of a `Mocap`; due, poses: of those that have not arrived, in rings."""
 
     noise: NoiseArrays
     payload_noise: NoiseArrays
-    taken: np.ndarray
-    due: np.ndarray
-    poses: np.ndarray
-    first: np.ndarray
-    count: np.ndarray
-    arrived: np.ndarray
-    grip: np.ndarray
-    numbers: np.ndarray
+    taken: np.ndarray  # (2, POSE) newest pose of vehicle and payload, see `take_pose`
+    due: np.ndarray  # (2, WAITING) [ticks]
+    poses: np.ndarray  # (2, WAITING, POSE)
+    first: np.ndarray  # (2,) of the rings
+    count: np.ndarray  # (2,) of the rings
+    arrived: np.ndarray  # (2,) how many at this tick, the rows before first
+    grip: np.ndarray  # (3,) [m] the payload's
+    numbers: np.ndarray  # (1,) see REAL
 
 
 POSE = 8  # stamp [s], position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU

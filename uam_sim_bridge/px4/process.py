@@ -148,14 +148,12 @@ def end_of_all(px4: Px4Process) -> bool:
 
 
 class How(NamedTuple):
-    """How PX4 runs. start: returns a running PX4 in the given new folder; log: where its logs are
-    kept, if at all; over: waits for the end, and returns whether PX4 is started anew (by default
-    never); anew: said then."""
+    """How PX4 runs; by default it is not started anew."""
 
-    start: Callable[[Path], Px4Process]
-    log: Path | None
-    over: Callable[[Px4Process], bool] = end_of_all
-    anew: str = ""
+    start: Callable[[Path], Px4Process]  # returns a running PX4 in the given new folder
+    log: Path | None  # where its logs are kept, if at all
+    over: Callable[[Px4Process], bool] = end_of_all  # waits for the end; True: PX4 starts anew
+    anew: str = ""  # said then
 
 
 def command(

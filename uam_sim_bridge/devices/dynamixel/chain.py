@@ -36,32 +36,25 @@ class ArmError(ValueError):
 
 @dataclass(frozen=True)
 class ServoDescription:
-    """One servo and its joint.
-
-    direction: 1 or -1; zero [counts]: position at angle 0; gear: turns of the servo per turn of the
-    joint; torque_constant [N m/A] at the joint; current_unit, current_limit [A]; low, high [rad];
-    stowed [rad]; coulomb [N m], viscous [N m s/rad]: friction at the joint; torque_scale: factor
-    that torque_constant contains. mode: its own Operating Mode, None: that of the vehicle's servos;
-    speed [rad/s]: of its own profile in a position mode, 0: none.
-    """
+    """One servo and its joint."""
 
     joint: str
     id: int
     table: ControlTable
-    direction: int
-    zero: int
-    gear: float
-    torque_constant: float
-    current_unit: float
-    current_limit: float
-    low: float
-    high: float
-    stowed: float
-    coulomb: float = 0.0
-    viscous: float = 0.0
-    torque_scale: float = 1.0
-    mode: int | None = None
-    speed: float = 0.0
+    direction: int  # 1 or -1
+    zero: int  # [counts] position at angle 0
+    gear: float  # turns of the servo per turn of the joint
+    torque_constant: float  # [N m/A] at the joint
+    current_unit: float  # [A]
+    current_limit: float  # [A]
+    low: float  # [rad]
+    high: float  # [rad]
+    stowed: float  # [rad]
+    coulomb: float = 0.0  # [N m] friction at the joint
+    viscous: float = 0.0  # [N m s/rad] friction at the joint
+    torque_scale: float = 1.0  # factor that torque_constant contains
+    mode: int | None = None  # its own Operating Mode; None: that of the vehicle's servos
+    speed: float = 0.0  # [rad/s] of its own profile in a position mode; 0: none
 
     @property
     def label(self) -> str:
@@ -110,16 +103,13 @@ class ServoDescription:
 
 @dataclass(frozen=True)
 class ArmChain:
-    """The chain: serial device, baud rate, return delay [s] of every servo, servos base to tip.
-
-    The last one may be a gripper's. Its angle is the opening / transmission [m/rad].
-    """
+    """Servos on a serial line."""
 
     device: str
     baud_rate: int
-    return_delay: float
-    servos: tuple[ServoDescription, ...]
-    transmission: float = 0.0
+    return_delay: float  # [s] of every servo
+    servos: tuple[ServoDescription, ...]  # base to tip; the last one may be a gripper's
+    transmission: float = 0.0  # [m/rad] opening / angle of the gripper's servo
 
     @property
     def arm(self) -> tuple[ServoDescription, ...]:

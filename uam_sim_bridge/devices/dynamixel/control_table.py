@@ -66,16 +66,13 @@ class Register:
 
 @dataclass(frozen=True)
 class ControlTable:
-    """Registers of a model by name, and the units of position and velocity.
-
-    counts_per_turn of the position; velocity_unit [rad/s].
-    """
+    """Registers of a model by name, and the units of position and velocity."""
 
     model: str
     number: int
     registers: dict[str, Register]
-    counts_per_turn: int
-    velocity_unit: float
+    counts_per_turn: int  # of the position
+    velocity_unit: float  # [rad/s]
 
     def __getitem__(self, name: str) -> Register:
         """Return the register of that name. Raises ControlTableError."""

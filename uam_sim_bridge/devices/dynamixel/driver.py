@@ -34,16 +34,13 @@ NEEDED_LATENCY = 0.001  # [s] of the adapter's timer
 
 @dataclass(frozen=True)
 class Reading:
-    """Joint angles (n,) [rad], velocities (n,) [rad/s], motor torques (n,) [N m] at `time` [s].
+    """State of the joints at a time."""
 
-    grip (2,): opening [m] and closing force [N] of a gripper, NaN while it does not answer.
-    """
-
-    time: float
-    position: np.ndarray
-    velocity: np.ndarray
-    effort: np.ndarray
-    grip: np.ndarray
+    time: float  # [s]
+    position: np.ndarray  # (n,) [rad]
+    velocity: np.ndarray  # (n,) [rad/s]
+    effort: np.ndarray  # (n,) [N m] of the motors
+    grip: np.ndarray  # (2,) opening [m], closing force [N] of a gripper, NaN without an answer
 
 
 @dataclass(frozen=True)

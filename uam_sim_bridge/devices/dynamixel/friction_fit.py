@@ -29,25 +29,19 @@ class FitError(ValueError):
 
 @dataclass(frozen=True)
 class FrictionFit:
-    """Result of a fit, with standard deviations.
+    """Result of a fit, with standard deviations."""
 
-    scale [1]: true torque constant / that of the hardware file; coulomb [N m]; viscous
-    [N m s/rad]; inertia [kg m^2]; residual: standard deviation of the torque [N m];
-    scale_known: whether the weight was large enough, else scale is 1; velocity, torque (m,): the
-    used samples without weight and inertia, for the picture.
-    """
-
-    scale: float
-    coulomb: float
-    viscous: float
-    inertia: float
+    scale: float  # [1] true torque constant / that of the hardware file
+    coulomb: float  # [N m]
+    viscous: float  # [N m s/rad]
+    inertia: float  # [kg m^2]
     scale_deviation: float
     coulomb_deviation: float
     viscous_deviation: float
-    residual: float
-    scale_known: bool
-    velocity: np.ndarray
-    torque: np.ndarray
+    residual: float  # [N m] standard deviation of the torque
+    scale_known: bool  # whether the weight was large enough, else scale is 1
+    velocity: np.ndarray  # (m,) used samples, for the picture
+    torque: np.ndarray  # (m,) of them, without weight and inertia
 
 
 def fit_friction(record: Record, joint: int, weight: np.ndarray) -> FrictionFit:

@@ -30,24 +30,19 @@ def advice(status: int) -> str:
 
 @dataclass
 class ServoHealth:
-    """What the driver last read of one servo, and counts since the start.
-
-    temperature [deg C] and voltage [V]: NaN until read; error: Hardware Error Status; torque_on: as
-    last read; misses: reads without an answer; in_a_row: of them the newest; lost: missed_reads
-    in a row; restarts: losses of torque without error; trips: of the watchdog.
-    """
+    """What the driver last read of one servo, and counts since the start."""
 
     label: str
     joint: str
-    temperature: float = math.nan
-    voltage: float = math.nan
-    error: int = 0
-    torque_on: bool = False
-    misses: int = 0
-    in_a_row: int = 0
-    lost: bool = False
-    restarts: int = 0
-    trips: int = 0
+    temperature: float = math.nan  # [deg C]; NaN until read
+    voltage: float = math.nan  # [V]; NaN until read
+    error: int = 0  # Hardware Error Status
+    torque_on: bool = False  # as last read
+    misses: int = 0  # reads without an answer
+    in_a_row: int = 0  # misses since the last answer
+    lost: bool = False  # missed_reads in a row
+    restarts: int = 0  # losses of torque without error
+    trips: int = 0  # of the watchdog
 
     @property
     def problem(self) -> str:

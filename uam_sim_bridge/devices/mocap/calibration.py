@@ -51,19 +51,14 @@ LOWEST, HIGHEST = -0.1, 0.5  # [m] of the pivot from base_link, upwards
 
 @dataclass(frozen=True)
 class Calibration:
-    """up: the tracker's axis that points up, y or z; heading [rad]: about it, tracker → world.
+    """From the tracker's axes and a rigid body to the world and base_link."""
 
-    origin (3,) [m, ENU]: subtracted from positions; body (4,) [w x y z]: rotation b → r; pivot (3,)
-    [m, FLU]: of the rigid body, from base_link; measured: residuals of the measurement, {} for a
-    nominal calibration.
-    """
-
-    up: str
-    heading: float
-    origin: tuple[float, ...]
-    body: tuple[float, ...]
-    pivot: tuple[float, ...]
-    measured: Mapping[str, float | str]
+    up: str  # the tracker's axis that points up, y or z
+    heading: float  # [rad] about it, tracker → world
+    origin: tuple[float, ...]  # (3,) [m, ENU] subtracted from positions
+    body: tuple[float, ...]  # (4,) [w x y z] rotation b → r
+    pivot: tuple[float, ...]  # (3,) [m, FLU] of the rigid body, from base_link
+    measured: Mapping[str, float | str]  # residuals of the measurement; {}: nominal
 
     @property
     def world(self) -> np.ndarray:

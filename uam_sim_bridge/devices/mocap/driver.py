@@ -142,15 +142,12 @@ class Level(Enum):
 
 
 class StampedPose(NamedTuple):
-    """stamp [ns] of the exposure, host's clock; position (3,) [m, ENU]; quaternion (4,) FLU → ENU.
+    """Pose at an exposure."""
 
-    payload: whose pose it is, the payload's or the vehicle's.
-    """
-
-    payload: bool
-    stamp: int
-    position: np.ndarray
-    quaternion: np.ndarray
+    payload: bool  # whether it is the payload's, else the vehicle's
+    stamp: int  # [ns] of the exposure, host's clock
+    position: np.ndarray  # (3,) [m, ENU]
+    quaternion: np.ndarray  # (4,) FLU → ENU
 
 
 class MocapDriver:

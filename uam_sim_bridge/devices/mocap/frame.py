@@ -11,45 +11,31 @@ class MocapError(ValueError):
 
 
 class BodyPose(NamedTuple):
-    """Pose of a rigid body in the tracker's axes: position (3,) [m], unit quaternion (4,).
+    """Pose of a rigid body in the tracker's axes."""
 
-    The quaternion [w x y z] goes from the rigid body's axes to the tracker's.
-    """
-
-    position: np.ndarray
-    quaternion: np.ndarray
+    position: np.ndarray  # (3,) [m]
+    quaternion: np.ndarray  # (4,) [w x y z] rigid body's axes → tracker's, unit norm
 
 
 class Frame(NamedTuple):
-    """One exposure.
+    """One exposure."""
 
-    arrival [ns]: host's clock; number: counted by the server, None if it counts none; exposed,
-    sent [s]: middle of the exposure and transmission by the server's clock, None if not known;
-    bodies: name → pose, None for a body that is not tracked in this frame.
-    """
-
-    arrival: int
-    number: int | None
-    exposed: float | None
-    sent: float | None
-    bodies: dict[str, BodyPose | None]
+    arrival: int  # [ns] host's clock
+    number: int | None  # counted by the server; None: it counts none
+    exposed: float | None  # [s] middle of the exposure, server's clock; None: not known
+    sent: float | None  # [s] transmission, server's clock; None: not known
+    bodies: dict[str, BodyPose | None]  # by name; None: not tracked in this frame
 
 
 class MocapSource(Protocol):
-    """A connection to a tracking system.
+    """A connection to a tracking system."""
 
-    `connected`: whether the server has answered; `names`: of the rigid bodies that it knows, None
-    before its list arrives; `bad`: packets that cannot be read; `sessions`: number of connections
-    so far; `description`: what it is connected to, and `failure`: what is wrong with it, "" for
-    nothing, both for messages.
-    """
-
-    connected: bool
-    names: tuple[str, ...] | None
-    bad: int
-    sessions: int
-    description: str
-    failure: str
+    connected: bool  # whether the server has answered
+    names: tuple[str, ...] | None  # of the rigid bodies that it knows; None: its list has not come
+    bad: int  # packets that cannot be read
+    sessions: int  # number of connections so far
+    description: str  # what it is connected to, for messages
+    failure: str  # what is wrong with it, for messages; "": nothing
 
     def frames(self, timeout: float) -> list[Frame]:
         """Return the frames that have arrived; wait at most `timeout` [s] for the first."""

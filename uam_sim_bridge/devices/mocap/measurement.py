@@ -34,16 +34,13 @@ class TimedPose(NamedTuple):
 
 
 class StillPose(NamedTuple):
-    """position (3,) [m] and quaternion (4,) [w x y z], tracker's axes: means of `count` poses.
+    """Mean of several poses, tracker's axes."""
 
-    spread [m], wobble [rad]: root mean square of the distances from the means.
-    """
-
-    position: np.ndarray
-    quaternion: np.ndarray
-    spread: float
-    wobble: float
-    count: int
+    position: np.ndarray  # (3,) [m]
+    quaternion: np.ndarray  # (4,) [w x y z]
+    spread: float  # [m] root mean square of the distances from the mean
+    wobble: float  # [rad] the same
+    count: int  # of the poses
 
 
 def still(poses: Sequence[TimedPose], what: str) -> StillPose:

@@ -15,9 +15,8 @@ ARMED = {Request.ARM: True, Request.DISARM: False, Request.KILL: False}
 
 
 class FlightState:
-    """`mode`, `armed`: newest ones; `intended`: the mode that was chosen last by a person or a
-    companion; `armed_since` [s] or None: tick of the first report that it is armed; `failsafe`,
-    `landed`, `killed` (the kill switch is engaged): latest report.
+    """`intended`: the mode that was chosen last by a person or a companion; `killed`: the kill
+    switch is engaged; the others are newest reports.
 
     The part of an `AutopilotPort` that both ports have; all times are those of the ticks [s].
     A subclass has `heard` [s]: newest message, and `loss_time`.
@@ -30,7 +29,7 @@ class FlightState:
     def __init__(self) -> None:
         self.mode = self.intended = Mode.UNKNOWN
         self.armed = self.landed = self.failsafe = self.killed = False
-        self.armed_since: float | None = None
+        self.armed_since: float | None = None  # [s] tick of the first report that it is armed
         self._mode_settles = self._arming_settles = -math.inf
         self._doubted: Mode | None = None  # reported while the mode settles
 

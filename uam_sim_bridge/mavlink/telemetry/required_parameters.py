@@ -39,19 +39,15 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True)
 class Rule:
-    """What a parameter must be, and why.
-
-    values: allowed ones, () for any; least, most: limits, both allowed; bits: all must be set;
-    optional: an autopilot without this parameter passes; instead: so does one with that parameter.
-    """
+    """What a parameter must be, and why."""
 
     why: str
-    values: tuple[float, ...] = ()
-    least: float = -math.inf
-    most: float = math.inf
-    bits: int = 0
-    optional: bool = False
-    instead: str = ""
+    values: tuple[float, ...] = ()  # allowed ones; (): any
+    least: float = -math.inf  # limit, itself allowed
+    most: float = math.inf  # limit, itself allowed
+    bits: int = 0  # all must be set
+    optional: bool = False  # an autopilot without this parameter passes
+    instead: str = ""  # one with that parameter passes, too
 
     def met(self, value: float) -> bool:
         """Return whether the value meets the rule, to the accuracy of 32-bit numbers."""

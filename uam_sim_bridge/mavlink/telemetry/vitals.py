@@ -18,18 +18,14 @@ _NAN = math.nan
 
 @dataclass(frozen=True)
 class Battery:
-    """State of the battery; NaN means unknown.
+    """State of the battery; NaN means unknown."""
 
-    voltage [V]; current [A], positive for discharge; left: state of charge 0..1; consumed [A h];
-    temperature [deg C]; cells: cell voltages [V], () if only their sum is measured.
-    """
-
-    voltage: float = _NAN
-    current: float = _NAN
-    left: float = _NAN
-    consumed: float = _NAN
-    temperature: float = _NAN
-    cells: tuple[float, ...] = ()
+    voltage: float = _NAN  # [V]
+    current: float = _NAN  # [A] positive for discharge
+    left: float = _NAN  # state of charge, 0..1
+    consumed: float = _NAN  # [A h]
+    temperature: float = _NAN  # [deg C]
+    cells: tuple[float, ...] = ()  # [V]; (): only their sum is measured
 
     @property
     def known(self) -> bool:
@@ -118,17 +114,13 @@ def unhealthy(present: int, enabled: int, health: int) -> tuple[str, ...]:
 
 @dataclass
 class Vitals:
-    """Newest values; None before the first message.
-
-    estimator_flags: ESTIMATOR_STATUS.flags; unhealthy: names of sensors; load: of the processor,
-    0..1; radio: whether the pilot's radio is received.
-    """
+    """Newest values; None before the first message."""
 
     battery: Battery | None = None
-    estimator_flags: int | None = None
-    unhealthy: tuple[str, ...] = ()
-    load: float | None = None
-    radio: bool | None = None
+    estimator_flags: int | None = None  # ESTIMATOR_STATUS.flags
+    unhealthy: tuple[str, ...] = ()  # names of sensors
+    load: float | None = None  # of the processor, 0..1
+    radio: bool | None = None  # whether the pilot's radio is received
 
     def take(self, kind: str, m: Message) -> None:
         """Store BATTERY_STATUS, SYS_STATUS or ESTIMATOR_STATUS; other messages are ignored."""

@@ -39,8 +39,7 @@ def resolve(host: str) -> str:
 class StreamTransport:
     """Base class of TCP and serial links.
 
-    `connected`: link is open; `dropped`: frames not sent; `losses`: number of link losses. A
-    subclass implements `_open` (sets `_opened`, returns whether the link is up, raises OSError on
+    A subclass implements `_open` (sets `_opened`, returns whether the link is up, raises OSError on
     failure), `_read` and `_write`.
     """
 
@@ -50,7 +49,7 @@ class StreamTransport:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """clock: wall time [s], for the intervals between attempts."""
         self.connected = False
-        self.dropped = self.losses = 0
+        self.dropped = self.losses = 0  # frames not sent, losses of the link
         self._clock = clock
         self._rest = b""
         self._opened: serial.Serial | socket.socket | None = None

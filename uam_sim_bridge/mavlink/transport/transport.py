@@ -26,17 +26,12 @@ SLOWEST, FASTEST = 9600, 12_500_000  # baud
 
 
 class Transport(Protocol):
-    """A link that carries bytes.
+    """A link that carries bytes."""
 
-    `stream`: True if `receive` returns arbitrary chunks (TCP, serial), False for whole datagrams;
-    `bytes_per_second`: rate of the line, None if unknown; `connected`: whether the local end is
-    open; `dropped`: number of frames that could not be sent.
-    """
-
-    stream: bool
-    bytes_per_second: float | None
-    connected: bool
-    dropped: int
+    stream: bool  # True: `receive` returns any chunks (TCP, serial); False: whole datagrams
+    bytes_per_second: float | None  # of the line; None: unknown
+    connected: bool  # whether the local end is open
+    dropped: int  # frames that could not be sent
 
     def send(self, data: bytes) -> bool: ...
 
@@ -106,15 +101,12 @@ class UdpTransport:
 
 @dataclass(frozen=True)
 class LinkUrl:
-    """Parts of a link's URL. kind: udp, tcp or serial; place: host or device.
+    """Parts of a link's URL."""
 
-    number: port or baud rate; local: local UDP port, 0 for any.
-    """
-
-    kind: str
-    place: str
-    number: int
-    local: int = 0
+    kind: str  # udp, tcp or serial
+    place: str  # host or device
+    number: int  # port or baud rate
+    local: int = 0  # local UDP port; 0: any
 
     @property
     def real(self) -> bool:

@@ -23,20 +23,16 @@ def generator(seed: int, name: str) -> np.random.Generator:
 
 
 class EffectArrays(NamedTuple):
-    """What the compiled tick has of the effects.
+    """What the compiled tick has of the effects. Hooks (k, 2): see `hooks.table`."""
 
-    tick, joints, sample, pose (k, 2): hooks, see `hooks.table`; lift (rotors,), row: `sample` of
-    `Bench`; factor (rotors,): on the thrust without `lift`; numbers (1,): lost, late of `Bench`.
-    """
-
-    tick: np.ndarray
+    tick: np.ndarray  # hooks, as the next three
     joints: np.ndarray
     sample: np.ndarray
     pose: np.ndarray
-    lift: np.ndarray
-    row: np.ndarray
-    factor: np.ndarray
-    numbers: np.ndarray
+    lift: np.ndarray  # (rotors,) of `Bench`
+    row: np.ndarray  # `sample` of `Bench`
+    factor: np.ndarray  # (rotors,) on the thrust without `lift`
+    numbers: np.ndarray  # (1,) lost, late of `Bench`
 
 
 class ActingEffects:

@@ -116,22 +116,20 @@ def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> floa
 
 
 class OcclusionArrays(NamedTuple):
-    """pose, status (1,): of `Bench`; base, axes, markers, cameras, thickness, seen: see
-    `seen_markers`; errors (markers, 3) [m, FLU]: of the markers; bodies: xpos of MuJoCo; chain: the
-    arm's, base to tip; tip, payload (3,) [m, ENU]; points: for the arm and a held payload."""
+    """What the occlusion uses. Fields without a comment: see `seen_markers`."""
 
-    pose: np.ndarray
-    status: np.ndarray
+    pose: np.ndarray  # of `Bench`
+    status: np.ndarray  # (1,) of `Bench`
     base: np.ndarray
     axes: np.ndarray
     markers: np.ndarray
     cameras: np.ndarray
-    errors: np.ndarray
-    bodies: np.ndarray
-    chain: np.ndarray
-    tip: np.ndarray
-    payload: np.ndarray
-    points: np.ndarray
+    errors: np.ndarray  # (markers, 3) [m, FLU] of the markers
+    bodies: np.ndarray  # xpos of MuJoCo
+    chain: np.ndarray  # the arm's, base to tip
+    tip: np.ndarray  # (3,) [m, ENU]
+    payload: np.ndarray  # (3,) [m, ENU]
+    points: np.ndarray  # for the arm and a held payload
     seen: np.ndarray
     thickness: float
 

@@ -48,22 +48,18 @@ def several(description: str, unit: str, low: float, high: float, length: int = 
 class Bench:
     """The parts of a plant on which effects act. Its arrays never move.
 
-    rotors: their efficiency and constants may change; mocap; body: the vehicle's arrays. `period`
-    [s]: of control; `joints`: number n; `arm`: their degrees of freedom; `sample` (8 + 3 n,):
-    newest of IMU and joints, see `PlantArrays`; `pose` (POSE,): newest of the motion capture;
-    `lift` (rotors,): factors on the thrust of the next tick, set to 1 before each tick; `positions`
-    (rotors, 3) [m, FLU] and `directions` (rotors,), 1 for counter-clockwise; `base_position` (3,),
-    `base_axes` (9,): of MuJoCo. `lost`: whether the newest pose is; `late` [s]: its added delay.
+    `period` [s]: of control; `joints`: number n; `arm`: their degrees of freedom; `base_position`
+    (3,), `base_axes` (9,): of MuJoCo.
     """
 
     vehicle: Vehicle
     model: mujoco.MjModel
     data: mujoco.MjData
-    rotors: Rotors
+    rotors: Rotors  # their efficiency and constants may change
     mocap: Mocap
-    body: Body
+    body: Body  # the vehicle's arrays
 
-    lost, late = Number(), Number()
+    lost, late = Number(), Number()  # whether the newest pose is; [s] its added delay
 
     def __post_init__(self) -> None:
         self.memory = record("lost", "late")
@@ -71,10 +67,10 @@ class Bench:
         self.period, self.joints = described.control_period, len(described.joints)
         first = model.joint(described.joint_names[0]).dofadr[0]
         self.arm = slice(first, first + self.joints)
-        self.sample = np.empty(8 + 3 * self.joints)
-        self.pose = self.mocap.arrays.taken[VEHICLE_POSE]
-        self.lift = np.ones(len(described.rotors))
-        self.positions = np.array([rotor.position for rotor in described.rotors])
+        self.sample = np.empty(8 + 3 * self.joints)  # newest of IMU and joints, see `PlantArrays`
+        self.pose = self.mocap.arrays.taken[VEHICLE_POSE]  # newest of the motion capture
+        self.lift = np.ones(len(described.rotors))  # factors on the thrust; 1 before each tick
+        self.positions = np.array([rotor.position for rotor in described.rotors])  # [m, FLU]
         turns = [1.0 if r.counter_clockwise else -1.0 for r in described.rotors]
         self.directions = np.array(turns)
         base = model.body(BASE).id

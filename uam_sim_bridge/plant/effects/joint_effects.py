@@ -153,21 +153,16 @@ def followed(bench: Bench, motor: np.ndarray, stiffness: float, damping: float) 
 
 
 class Gear(NamedTuple):
-    """The motors behind the gears of n joints.
+    """The motors behind the gears of n joints. constants: half backlash [rad], stiffness [N m/rad],
+    damping [N m s/rad], stiction [1], Stribeck speed [rad/s], width [rad/s], step [s]."""
 
-    inertia (n,) [kg m^2], coulomb (n,) [N m], load (n,) [1]; constants (7,): half backlash [rad],
-    stiffness [N m/rad], damping [N m s/rad], stiction [1], Stribeck speed [rad/s], width [rad/s],
-    step [s]; teeth (n,): part of stiffness and damping, see `followed`; their state: angle (n,)
-    [rad], speed (n,) [rad/s].
-    """
-
-    inertia: np.ndarray
-    coulomb: np.ndarray
-    load: np.ndarray
-    constants: np.ndarray
-    teeth: np.ndarray
-    angle: np.ndarray
-    speed: np.ndarray
+    inertia: np.ndarray  # (n,) [kg m^2]
+    coulomb: np.ndarray  # (n,) [N m]
+    load: np.ndarray  # (n,) [1]
+    constants: np.ndarray  # (7,)
+    teeth: np.ndarray  # (n,) part of stiffness and damping, see `followed`
+    angle: np.ndarray  # (n,) [rad] state
+    speed: np.ndarray  # (n,) [rad/s] state
 
 
 @borrowing

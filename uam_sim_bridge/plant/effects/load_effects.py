@@ -140,23 +140,21 @@ def momentum(
 
 
 class DownwashArrays(NamedTuple):
-    """offset (3,) [m]: for `push`; payload (3,) [m, ENU], force (3,) [N, ENU] on it; base to
-    radius, spreading: see `momentum`; eddies: white noise, eddy (1,): the present eddy's part of
-    the mean velocity, keep: of an eddy in a tick; pressure [kg/m]: force / u^2."""
+    """What `push` uses; base to thrust, radius and spreading: see `momentum`."""
 
-    payload: np.ndarray
-    force: np.ndarray
-    offset: np.ndarray
+    payload: np.ndarray  # (3,) [m, ENU]
+    force: np.ndarray  # (3,) [N, ENU] on the payload
+    offset: np.ndarray  # (3,) [m] for `push`
     base: np.ndarray
     axes: np.ndarray
     positions: np.ndarray
     thrust: np.ndarray
-    eddies: NoiseArrays
-    eddy: np.ndarray
+    eddies: NoiseArrays  # white noise
+    eddy: np.ndarray  # (1,) the present eddy's part of the mean velocity
     radius: float
     spreading: float
-    keep: float
-    pressure: float
+    keep: float  # of an eddy in a tick
+    pressure: float  # [kg/m] force / u^2
 
 
 @borrowing

@@ -66,24 +66,18 @@ class PropellerVibration(Effect):
 
 
 class Shaken(NamedTuple):
-    """Rotors and frame.
+    """Rotors and frame."""
 
-    sample: see `Bench`; speed (rotors,) [rad/s]; directions (rotors,): 1 counter-clockwise;
-    positions (rotors, 3) [m, FLU]; phases (rotors,) [rad]: their state; imbalance (rotors,) [kg m];
-    blade [N s^2/rad^2]: amplitude of the thrust / speed^2; mass: frame gain / mass [1/kg]; inertia
-    (3,): frame gain / inertia [1/(kg m^2)]; period [s]: of a sample.
-    """
-
-    sample: np.ndarray
-    speed: np.ndarray
-    directions: np.ndarray
-    positions: np.ndarray
-    phases: np.ndarray
-    imbalance: np.ndarray
-    blade: float
-    mass: float
-    inertia: np.ndarray
-    period: float
+    sample: np.ndarray  # see `Bench`
+    speed: np.ndarray  # (rotors,) [rad/s]
+    directions: np.ndarray  # (rotors,) 1 counter-clockwise
+    positions: np.ndarray  # (rotors, 3) [m, FLU]
+    phases: np.ndarray  # (rotors,) [rad] their state
+    imbalance: np.ndarray  # (rotors,) [kg m]
+    blade: float  # [N s^2/rad^2] amplitude of the thrust / speed^2
+    mass: float  # [1/kg] frame gain / mass
+    inertia: np.ndarray  # (3,) [1/(kg m^2)] frame gain / inertia
+    period: float  # [s] of a sample
 
 
 @borrowing

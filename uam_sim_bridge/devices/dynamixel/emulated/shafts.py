@@ -17,16 +17,12 @@ from uam_sim_bridge.devices.dynamixel.control_table import CURRENT_MODE
 
 @dataclass(frozen=True)
 class Drive:
-    """What the servo's electronics do to the motor.
+    """What the servo's electronics do to the motor."""
 
-    on: torque enabled; mode: value of Operating Mode; current [A]: goal, within the current limit;
-    position [rad]: goal, in the position modes only.
-    """
-
-    on: bool = False
-    mode: int = 0
-    current: float = 0.0
-    position: float = 0.0
+    on: bool = False  # torque enabled
+    mode: int = 0  # value of Operating Mode
+    current: float = 0.0  # [A] goal, within the current limit
+    position: float = 0.0  # [rad] goal, in the position modes only
 
 
 class Shaft(Protocol):

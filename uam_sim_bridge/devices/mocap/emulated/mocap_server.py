@@ -38,20 +38,16 @@ class Body(Protocol):
 
 @dataclass(frozen=True)
 class Streaming:
-    """How a server streams.
+    """How a server streams."""
 
-    rate [Hz]; version: NatNet's; address: of the server; port, data_port: 0 for free ones; clock:
-    offset [s] and drift of the server's; latency [s]: exposure to transmission.
-    """
-
-    rate: float = 120.0
-    version: tuple[int, int] = (3, 1)
+    rate: float = 120.0  # [Hz]
+    version: tuple[int, int] = (3, 1)  # NatNet's
     multicast: bool = False
-    address: str = "127.0.0.1"
-    port: int = 0
-    data_port: int = 0
-    clock: tuple[float, float] = (-1.7e9, 0.0)
-    latency: float = 0.004
+    address: str = "127.0.0.1"  # of the server
+    port: int = 0  # 0: a free one
+    data_port: int = 0  # 0: a free one
+    clock: tuple[float, float] = (-1.7e9, 0.0)  # offset [s] and drift of the server's
+    latency: float = 0.004  # [s] exposure to transmission
 
 
 class MocapServer:
