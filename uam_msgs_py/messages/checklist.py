@@ -25,16 +25,15 @@ LEVELS = {PASSED: OK, FAILED: ERROR, OPEN: STALE}
 
 @dataclass(frozen=True)
 class ChecklistItem:
-    """kind: "automatic" or "guided"; result: PASSED, FAILED or OPEN; time [s]: of the result, by
-    stamps, "" without one; confirmed: by the person."""
+    """An item of a checklist."""
 
     name: str
-    kind: str
-    result: str
+    kind: str  # "automatic" or "guided"
+    result: str  # PASSED, FAILED or OPEN
     value: str
     limit: str
-    time: str = ""
-    confirmed: bool = False
+    time: str = ""  # [s] of the result, by stamps, "" without one
+    confirmed: bool = False  # by the person
 
 
 def checklist_message(

@@ -93,13 +93,12 @@ def read_reference(data: bytes, joints: int | None = None) -> tuple[int, Referen
 
 @dataclass(frozen=True)
 class PositionCommand:
-    """tau_p (3,) [N, world]; attitude (3, 3): rows q_d, Omega_d, Omega_d_dot; reference (3, 3):
-    rows p_d, p_d_dot, p_d_ddot. Zeros while idle."""
+    """Output of the position law. Zeros while idle."""
 
-    tau: np.ndarray
-    attitude: np.ndarray
+    tau: np.ndarray  # tau_p (3,) [N, world]
+    attitude: np.ndarray  # (3, 3) rows q_d, Omega_d, Omega_d_dot
     flying: bool
-    reference: np.ndarray
+    reference: np.ndarray  # (3, 3) rows p_d, p_d_dot, p_d_ddot
 
 
 NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False, np.zeros((3, 3)))

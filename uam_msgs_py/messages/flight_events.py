@@ -24,17 +24,12 @@ NUMBER = "number"
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """One request, which may change several values at once.
-
-    values: name → (old, new); old is None if the node has no such parameter. by: the service of the
-    request, or the part of the node that requested the change. reason: of a refusal, one line; ""
-    if accepted.
-    """
+    """One request, which may change several values at once. old: None without such a parameter."""
 
     node: str
-    by: str
-    values: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    reason: str = ""
+    by: str  # the service of the request, or the part of the node that requested the change
+    values: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # name → (old, new)
+    reason: str = ""  # of a refusal, one line; "" if accepted
 
     @property
     def accepted(self) -> bool:
@@ -83,15 +78,11 @@ def _pair(text: str) -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class FaultEvent:
-    """Begin (active) or end of a fault.
-
-    place: plant, MAVLink or process; number: index in the schedule of its place, the same at begin
-    and end.
-    """
+    """Begin (active) or end of a fault."""
 
     name: str
-    place: str
-    number: int
+    place: str  # plant, MAVLink or process
+    number: int  # index in the schedule of its place, the same at begin and end
     active: bool
     parameters: dict[str, Any] = field(default_factory=dict)
 

@@ -28,16 +28,12 @@ class ParameterDifference:
 
 @dataclass(frozen=True)
 class ParameterComparison:
-    """Result of the comparison.
+    """Result of the comparison."""
 
-    read, required: numbers of parameters; differences: those found so far; complete: nothing is
-    waited for any more.
-    """
-
-    read: int
-    required: int
-    complete: bool
-    differences: tuple[ParameterDifference, ...] = ()
+    read: int  # number of parameters
+    required: int  # number of parameters
+    complete: bool  # nothing is waited for any more
+    differences: tuple[ParameterDifference, ...] = ()  # those found so far
 
     NAME = "autopilot parameters"
 

@@ -113,29 +113,20 @@ _READ = {
 
 @dataclass(frozen=True)
 class AutopilotState(_Status):
-    """State of the autopilot as the bridge receives it; sent on change and five times a second.
-
-    armed_since: stamp [ns] of the first tick at which it was reported armed, None while disarmed.
-    reasons: why it is not armed or has left OFFBOARD, joined by "; ". round_trip [s]: shortest of
-    the last second; loop_delay [s]: from a body-rate setpoint to the gyro's response; None if
-    unknown. released_to: who has control in place of the companion, "" if
-    nobody has. landed: by the autopilot's land detector. lands: its mode lands the
-    vehicle by itself, or it is silent and may do so. failed: why the bridge flies no more, "" while
-    it may. stopped: a kill has ended the flight for good.
-    """
+    """State of the autopilot as the bridge receives it; sent on change and five times a second."""
 
     connected: bool = False
     mode: str = ""
     armed: bool = False
-    armed_since: int | None = None
-    reasons: str = ""
-    round_trip: float | None = None
-    released_to: str = ""
-    landed: bool = False
-    lands: bool = False
-    loop_delay: float | None = None
-    failed: str = ""
-    stopped: bool = False
+    armed_since: int | None = None  # stamp [ns] of the first tick reported armed, None: disarmed
+    reasons: str = ""  # why it is not armed or has left OFFBOARD, joined by "; "
+    round_trip: float | None = None  # [s] shortest of the last second; None if unknown
+    released_to: str = ""  # who has control in place of the companion, "" if nobody has
+    landed: bool = False  # by the autopilot's land detector
+    lands: bool = False  # its mode lands the vehicle by itself, or it is silent and may do so
+    loop_delay: float | None = None  # [s] body-rate setpoint to the gyro's response; None: unknown
+    failed: str = ""  # why the bridge flies no more, "" while it may
+    stopped: bool = False  # a kill has ended the flight for good
 
     NAME = "autopilot"
     LATER = (
@@ -163,42 +154,29 @@ class AutopilotState(_Status):
 
 @dataclass(frozen=True)
 class MissionStatus(_Status):
-    """State of the mission; sent on each change of phase and twice a second.
-
-    time: mission time [s], negative before take-off. Errors: norms of estimate − reference [m],
-    [rad], [rad], two ticks before; that of the attitude is from the desired attitude of the
-    position law. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
-    cause: the supervisor's state (uam_control.supervision.State) and the reason for it. regains:
-    number of commands so far to regain a released vehicle. tilt [rad]: angle between the vertical
-    axes of body and world. answers: number of goals and trajectories answered so far, answer: the
-    newest, "topic: accepted ..." or "topic: refused ...". grasp: state of the grasp
-    (uam_control.grasp.Grasp); attempt: number of the approach; decisions: number of decisions about
-    the payload so far, grasp_text: the newest. delay [s]: of the scenario's clock by holds and
-    grasps. setpoint_delay [s]: how much later than in the profile's model setpoints
-    act, None if unknown; delay_margin [s]: at which the loops oscillate.
-    """
+    """State of the mission; sent on each change of phase and twice a second. None: unknown."""
 
     phase: str = "waiting"
-    time: float = -1.0
-    position_error: float = 0.0
-    attitude_error: float = 0.0
-    arm_error: float = 0.0
+    time: float = -1.0  # [s] mission time, negative before take-off
+    position_error: float = 0.0  # [m] norm of estimate − reference, two ticks before
+    attitude_error: float = 0.0  # [rad] the same, from the desired attitude of the position law
+    arm_error: float = 0.0  # [rad] the same
     done: bool = False
     abort_reason: str = ""
-    magnet: bool = False
-    state: str = "grounded"
-    cause: str = ""
-    regains: int = 0
-    tilt: float = 0.0
-    answers: int = 0
-    answer: str = ""
-    grasp: str = ""
-    attempt: int = 0
-    decisions: int = 0
-    grasp_text: str = ""
-    delay: float = 0.0
-    setpoint_delay: float | None = None
-    delay_margin: float | None = None
+    magnet: bool = False  # whether it is on (/uam/magnet has no stamp, this message has one)
+    state: str = "grounded"  # the supervisor's (uam_control.supervision.State)
+    cause: str = ""  # reason for the state
+    regains: int = 0  # number of commands so far to regain a released vehicle
+    tilt: float = 0.0  # [rad] angle between the vertical axes of body and world
+    answers: int = 0  # number of goals and trajectories answered so far
+    answer: str = ""  # the newest, "topic: accepted ..." or "topic: refused ..."
+    grasp: str = ""  # state of the grasp (uam_control.grasp.Grasp)
+    attempt: int = 0  # number of the approach
+    decisions: int = 0  # number of decisions about the payload so far
+    grasp_text: str = ""  # the newest of them
+    delay: float = 0.0  # [s] of the scenario's clock by holds and grasps
+    setpoint_delay: float | None = None  # [s] how much later they act than in the profile's model
+    delay_margin: float | None = None  # [s] delay at which the loops oscillate
 
     NAME = "mission"
     LATER = (
@@ -222,22 +200,16 @@ class MissionStatus(_Status):
 
 @dataclass(frozen=True)
 class ChecklistState(_Status):
-    """State of the checklist of a real vehicle; sent on change and five times a second.
+    """State of the checklist of a real vehicle; sent on change and five times a second."""
 
-    passed: every item has; failing: names of the others, joined by "; ". step: what a person does
-    now, machine-readable, "" for nothing; needs: "motion", "confirm" or ""; instruction, seen: for
-    the person; failed: the step is tried again after a failure. commands: the mission computes
-    body rates for the vehicle in the hands of the person.
-    """
-
-    passed: bool = False
-    failing: str = ""
-    step: str = ""
-    needs: str = ""
-    instruction: str = ""
-    seen: str = ""
-    failed: bool = False
-    commands: bool = False
+    passed: bool = False  # every item has
+    failing: str = ""  # names of the others, joined by "; "
+    step: str = ""  # what a person does now, machine-readable, "" for nothing
+    needs: str = ""  # "motion", "confirm" or ""
+    instruction: str = ""  # for the person
+    seen: str = ""  # for the person
+    failed: bool = False  # the step is tried again after a failure
+    commands: bool = False  # the mission computes body rates for the vehicle in the person's hands
 
     NAME = "checklist"
 
@@ -256,14 +228,10 @@ class ChecklistState(_Status):
 
 @dataclass(frozen=True)
 class RadioState(_Status):
-    """What the autopilot reports of the pilot's radio; a further status of /uam/autopilot/state.
+    """What the autopilot reports of the pilot's radio; a further status of /uam/autopilot/state."""
 
-    killed: its kill switch is engaged (HEARTBEAT: MAV_STATE_FLIGHT_TERMINATION); received: whether
-    the autopilot receives it (SYS_STATUS, RC receiver): "yes", "no" or "" for unknown.
-    """
-
-    killed: bool = False
-    received: str = ""
+    killed: bool = False  # its kill switch is engaged (HEARTBEAT: MAV_STATE_FLIGHT_TERMINATION)
+    received: str = ""  # by the autopilot (SYS_STATUS, RC receiver): "yes", "no", "": unknown
 
     NAME = "radio"
 

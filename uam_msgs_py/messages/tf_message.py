@@ -194,16 +194,13 @@ TFMessage.__module__ = f"{PACKAGE}.msg"
 
 @dataclass(frozen=True)
 class Transform:
-    """Pose of frame `child` in frame `parent` at `stamp` [ns].
+    """Pose of frame `child` in frame `parent`."""
 
-    position (3,) [m]; quaternion (4,) [w x y z], child → parent.
-    """
-
-    stamp: int
+    stamp: int  # [ns]
     parent: str
     child: str
-    position: np.ndarray
-    quaternion: np.ndarray
+    position: np.ndarray  # (3,) [m]
+    quaternion: np.ndarray  # (4,) [w x y z] child → parent
 
 
 def transforms_message(transforms: Sequence[Transform]) -> bytes:

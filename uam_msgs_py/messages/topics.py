@@ -75,29 +75,22 @@ PLANS = _qos(10)  # each message counts
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic.
-
-    frame: of the numbers, "" for none; rate: in messages per second of the flight's time.
-    publisher: node, or in words. to: nodes that a flight waits for, so this topic is a wire of
-    `uam_msgs_py.node.wiring`; None: it is none, `readers` says who uses it. optional: these nodes
-    also work without the topic. one_publisher: a second one is a mistake; see
-    `uam_msgs_py.node.sole_publisher`. recorded: the recorder subscribes to it.
-    """
+    """A topic."""
 
     name: str
     type: type
     qos: QoSProfile = field(hash=False)  # not hashable
-    frame: str
+    frame: str  # of the numbers, "" for none
     unit: str
-    rate: str
-    publisher: str
+    rate: str  # in messages per second of the flight's time
+    publisher: str  # node, or in words
     _: KW_ONLY
     about: str
-    to: tuple[str, ...] | None = None
-    readers: str = ""
-    optional: bool = False
-    one_publisher: bool = True
-    recorded: bool = True
+    to: tuple[str, ...] | None = None  # nodes that a flight waits for; None: no `node.wiring.Wire`
+    readers: str = ""  # who uses it, if it is no wire
+    optional: bool = False  # these nodes also work without the topic
+    one_publisher: bool = True  # a second one is a mistake, see `node.sole_publisher`
+    recorded: bool = True  # the recorder subscribes to it
 
     def outlet(self, node: Node, **how: Any) -> Publisher:
         """Return a publisher of this topic; how: see `Node.create_publisher`."""

@@ -52,15 +52,12 @@ READERS, WRITERS = "readers of ", "writers of "
 
 @dataclass(frozen=True)
 class Wire:
-    """A topic from one node to several; the recorder is added by `listeners`.
-
-    optional: the subscribers also work without the topic.
-    """
+    """A topic from one node to several; the recorder is added by `listeners`."""
 
     topic: topics.Topic
     publisher: str
     subscribers: tuple[str, ...] = ()
-    optional: bool = False
+    optional: bool = False  # the subscribers also work without the topic
 
     def listeners(self, recorded: bool) -> tuple[str, ...]:
         """Return the subscribers, with the recorder if recorded."""
