@@ -23,14 +23,11 @@ from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 
 @dataclass(frozen=True)
 class Coupling:
-    """Coupling forces at m ticks, all (m, 8): N, world (p), N m, FLU (q), N m (alpha).
-
-    sigma: m/s^2 (p), rad/s^2 (q, alpha).
-    """
+    """Coupling forces at m ticks, all (m, 8): N, world (p), N m, FLU (q), N m (alpha)."""
 
     plant: np.ndarray  # H
     rest: np.ndarray  # d
-    sigma: np.ndarray  # -Mbar^-1 (H + d)
+    sigma: np.ndarray  # -Mbar^-1 (H + d): m/s^2 (p), rad/s^2 (q, alpha)
 
     def sigma_norm(self, subsystem: str) -> np.ndarray:
         """Return ||sigma_j|| (m,) [m/s^2 or rad/s^2]."""

@@ -26,23 +26,18 @@ GOAL = "x, y, z [m], heading [°]"
 
 @dataclass(frozen=True)
 class Button:
-    """A command and its services. on: value of a SetBool request, None for a Trigger.
-
-    ask: question to confirm first, "" for none; in_flight: the same, in the air only. events: of
-    the supervisor, of which one must be possible, () without. calls: of each service; kill counts
-    at the second.
-    """
+    """A command and its services."""
 
     label: str
     icon: str
     services: tuple[str, ...]
     hint: str
-    on: bool | None = None
-    ask: str = ""
-    in_flight: str = ""
+    on: bool | None = None  # value of a SetBool request, None for a Trigger
+    ask: str = ""  # question to confirm first, "" for none
+    in_flight: str = ""  # the same, in the air only
     colour: str | None = None
-    events: tuple[Event, ...] = ()
-    calls: int = 1
+    events: tuple[Event, ...] = ()  # of the supervisor, of which one must be possible, () without
+    calls: int = 1  # of each service; kill counts at the second
 
 
 def _each(service: str) -> tuple[str, ...]:

@@ -25,18 +25,14 @@ AXES = 0.12  # [m] of the reference frame
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape in the frame of its link.
-
-    kind: box, cylinder or sphere; size: edges (3,), (radius, length) or (radius,) [m]; position
-    (3,) [m]; quaternion [w x y z]; colour: red, green, blue, opacity, 0..1.
-    """
+    """A shape in the frame of its link."""
 
     link: str
-    kind: str
-    size: np.ndarray
-    position: np.ndarray
-    quaternion: np.ndarray
-    colour: tuple[float, ...]
+    kind: str  # box, cylinder or sphere
+    size: np.ndarray  # edges (3,), (radius, length) or (radius,) [m]
+    position: np.ndarray  # (3,) [m]
+    quaternion: np.ndarray  # [w x y z]
+    colour: tuple[float, ...]  # red, green, blue, opacity, 0..1
 
 
 def shapes(urdf: str) -> list[Shape]:

@@ -52,32 +52,27 @@ AUTOPILOT = "autopilot"  # name of its process
 @dataclass(frozen=True, kw_only=True)
 class FlightSettings(KeptOptions):
     """Checked settings of one flight, with scenario and profile loaded; see `FlightOptions`, too.
-
-    payload_mass [kg]; out: None for the default folder. link: to an autopilot started by the user,
-    parsed. without: nodes that are not started, see `foreign`; own_names: those of the nodes that
-    the user starts in place of them, where they differ. parameters: of the nodes without a profile.
-    remappings: node, or EVERY_NODE → topic or service → new name. namespace: in the form of ROS.
-    """
+    remappings: node, or EVERY_NODE → topic or service → new name."""
 
     scenario: Scenario
     profile: Profile
     vehicle: VehicleDescription
-    payload_mass: float
-    out: Path | None = None
+    payload_mass: float  # [kg]
+    out: Path | None = None  # None for the default folder
     px4: Px4Installation | None = None  # for the autopilot PX4
-    link: LinkUrl | None = None
+    link: LinkUrl | None = None  # to an autopilot started by the user, parsed
     scenario_source: str = ""  # as given by the user: a name or a file
     scenario_options: ScenarioOptions = ScenarioOptions()
     notes: tuple[str, ...] = ()  # about the settings, for the user
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
-    without: tuple[str, ...] = (COCKPIT,)
-    own_names: dict[str, str] = field(default_factory=dict)
+    without: tuple[str, ...] = (COCKPIT,)  # nodes that are not started, see `foreign`
+    own_names: dict[str, str] = field(default_factory=dict)  # node → other name of the user's
     faults: Schedule = Schedule()
     auto_start: bool = True
-    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)  # of nodes without profile
     remappings: dict[str, dict[str, str]] = field(default_factory=dict)
-    namespace: str = "/"
+    namespace: str = "/"  # in the form of ROS
     process: ProcessParameters = ProcessParameters()  # of the nodes that fly
 
     @property

@@ -6,27 +6,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FlightStatus:
-    """State of a flight at one moment.
-
-    time: mission time [s], negative before take-off. Errors: norms of the tracking error [m],
-    [rad], [rad]; attitude: from the attitude that the position law desires. tilt: angle between
-    the body's and the world's vertical axis [rad]. state, cause: of the supervisor, see
-    `uam_control.supervision.State`. released_to: who has control instead of the companion, ""
-    if nobody has. done: whether the mission has ended.
-    """
+    """State of a flight at one moment."""
 
     phase: str
-    time: float
-    position_error: float
-    attitude_error: float
-    arm_error: float
-    tilt: float
+    time: float  # [s] mission time, negative before take-off
+    position_error: float  # [m] norm of the tracking error
+    attitude_error: float  # [rad] norm, from the attitude that the position law desires
+    arm_error: float  # [rad] norm of the tracking error
+    tilt: float  # [rad] angle between the body's and the world's vertical axis
     real_time_factor: float
     autopilot: str = ""
-    state: str = ""
-    cause: str = ""
-    released_to: str = ""
-    done: bool = False
+    state: str = ""  # of the supervisor, see `uam_control.supervision.State`
+    cause: str = ""  # reason for the state
+    released_to: str = ""  # who has control instead of the companion, "" if nobody has
+    done: bool = False  # whether the mission has ended
 
 
 STARTING = "its node starts"  # text of a device whose node has not reported yet

@@ -153,12 +153,11 @@ def _lay_out(parts: Parts, answers: Answers) -> Told:
 
 @dataclass
 class Servos:
-    """The servos of the arm. section: `servos` of the YAML file; types: of each joint by name,
-    where they differ, else (); stall (n,) [N m]."""
+    """The servos of the arm."""
 
-    section: Tree
-    types: tuple[str, ...]
-    stall: tuple[float, ...]
+    section: Tree  # `servos` of the YAML file
+    types: tuple[str, ...]  # of each joint by name, where they differ, else ()
+    stall: tuple[float, ...]  # (n,) [N m]
 
 
 def servos_of(other: VehicleDescription) -> Servos:

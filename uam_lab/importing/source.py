@@ -21,45 +21,37 @@ class ImportRefused(VehicleError):
 
 @dataclass
 class RotorFacts:
-    """What a simulator's part of the file says of a rotor; None: nothing.
+    """What a simulator's part of the file says of a rotor; None: nothing."""
 
-    counter_clockwise: from above; thrust_max [N]; moment_ratio [m]; lag_up, lag_down [s];
-    coefficient [N s^2/rad^2]; speed_max [rad/s].
-    """
-
-    counter_clockwise: bool | None = None
-    thrust_max: float | None = None
-    moment_ratio: float | None = None
-    lag_up: float | None = None
-    lag_down: float | None = None
-    coefficient: float | None = None
-    speed_max: float | None = None
+    counter_clockwise: bool | None = None  # from above
+    thrust_max: float | None = None  # [N]
+    moment_ratio: float | None = None  # [m]
+    lag_up: float | None = None  # [s]
+    lag_down: float | None = None  # [s]
+    coefficient: float | None = None  # [N s^2/rad^2]
+    speed_max: float | None = None  # [rad/s]
 
 
 @dataclass
 class JointFacts:
-    """What the file says of a joint; 0: nothing. effort [N m], speed [rad/s]: its limits; mimic:
-    whether it follows another one."""
+    """What the file says of a joint; 0: nothing."""
 
-    effort: float = 0.0
-    speed: float = 0.0
-    mimic: bool = False
+    effort: float = 0.0  # [N m] limit
+    speed: float = 0.0  # [rad/s] limit
+    mimic: bool = False  # whether it follows another one
 
 
 @dataclass
 class Source:
-    """A description as MuJoCo reads it. meshes: name in the model → file; notes: what is missing.
-
-    rotors: by the name of link or joint; joints: by name.
-    """
+    """A description as MuJoCo reads it."""
 
     file: Path
     spec: mujoco.MjSpec
     lines: dict[tuple[str, str], str]
-    meshes: dict[str, Path] = field(default_factory=dict)
-    rotors: dict[str, RotorFacts] = field(default_factory=dict)
-    joints: dict[str, JointFacts] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    meshes: dict[str, Path] = field(default_factory=dict)  # name in the model → file
+    rotors: dict[str, RotorFacts] = field(default_factory=dict)  # by the name of link or joint
+    joints: dict[str, JointFacts] = field(default_factory=dict)  # by name
+    notes: list[str] = field(default_factory=list)  # what is missing
 
     def compiled(self) -> mujoco.MjModel:
         """Return the model; raise ImportRefused with MuJoCo's reason."""

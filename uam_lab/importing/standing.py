@@ -22,14 +22,13 @@ MOST_POSES = 3000
 
 @dataclass
 class Stance:
-    """ranges, stowed [deg]; feet (4, 3) [m]: in the base's frame; legs: whether they are added;
-    height [m]: of the base."""
+    """How a vehicle stands."""
 
-    ranges: list[Told]
-    stowed: list[Told]
-    feet: np.ndarray
-    legs: Told
-    height: float
+    ranges: list[Told]  # [deg]
+    stowed: list[Told]  # [deg]
+    feet: np.ndarray  # (4, 3) [m] in the base's frame
+    legs: Told  # whether they are added
+    height: float  # [m] of the base
 
 
 def stand(parts: Parts, answers: Answers) -> Stance:

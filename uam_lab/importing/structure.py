@@ -25,32 +25,27 @@ FREE = mujoco.mjtJoint.mjJNT_FREE
 
 @dataclass
 class Chosen:
-    """Names of parts that the user gives where the file leaves a choice; "" for none. magnet:
-    whether one is hung at the end effector."""
+    """Names of parts that the user gives where the file leaves a choice; "" for none."""
 
     base: str = ""
     arm: str = ""
     end_effector: str = ""
-    magnet: bool = True
+    magnet: bool = True  # whether one is hung at the end effector
 
 
 @dataclass
 class Parts:
-    """What was found. base: its body; joints: of the arm, base to tip; owner (bodies,): index of
-    the link to which a body belongs, 0 the base, i the link of joint i - 1, -1 not the vehicle's.
-    unusable: rotors of a file that has too few or too many. tip: body or
-    site of the end effector, "" for the far end of the last link.
-    """
+    """What was found."""
 
     source: Source
     model: mujoco.MjModel
     data: mujoco.MjData
-    base: int
-    joints: list[int]
-    owner: np.ndarray
+    base: int  # its body
+    joints: list[int]  # of the arm, base to tip
+    owner: np.ndarray  # (bodies,) a body's link: 0 the base, i of joint i - 1, -1 not the vehicle's
     rotors: list[FoundRotor]
-    unusable: list[FoundRotor]
-    tip: str = ""
+    unusable: list[FoundRotor]  # of a file that has too few or too many
+    tip: str = ""  # body or site of the end effector, "" for the far end of the last link
     magnet: bool = True
     notes: list[str] = field(default_factory=list)
 

@@ -78,25 +78,19 @@ def spent() -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a flight measured.
-
-    path: see `TickPath`; work: node → part → mean time per tick [ms]; latency (ticks,) [ms]: from
-    the publication of the sensors to that of the setpoint, by the plant, none in lockstep; missed,
-    ticks: setpoints that came more than three control periods late or never, of all; cores: process
-    → cores in flight; pace: simulated time per wall time; failure: "" for a completed flight.
-    """
+    """What a flight measured. The plant measures the latency; there is none in lockstep."""
 
     layout: str
     clock: str
     folder: Path
     path: TickPath
-    work: dict[str, dict[str, float]]
-    latency: np.ndarray
-    missed: int
-    ticks: int
-    pace: float
-    cores: dict[str, float] = field(default_factory=dict)
-    failure: str = ""
+    work: dict[str, dict[str, float]]  # node → part → mean time per tick [ms]
+    latency: np.ndarray  # (ticks,) [ms] from publication of the sensors to that of the setpoint
+    missed: int  # setpoints that came more than three control periods late or never
+    ticks: int  # all setpoints
+    pace: float  # simulated time per wall time
+    cores: dict[str, float] = field(default_factory=dict)  # process → cores in flight
+    failure: str = ""  # "" for a completed flight
 
     @property
     def figures(self) -> dict[str, float]:

@@ -25,15 +25,11 @@ class NoTicks(ValueError):
 
 @dataclass(frozen=True)
 class TickPath:
-    """The ticks that all nodes of `nodes` have measured.
+    """The ticks that all nodes of `nodes` have measured."""
 
-    nodes: the source of the sensors first; stamps (ticks,) [ns]; times (ticks, nodes, segments)
-    [ms]: of SEGMENTS.
-    """
-
-    nodes: tuple[str, ...]
-    stamps: np.ndarray
-    times: np.ndarray
+    nodes: tuple[str, ...]  # the source of the sensors first
+    stamps: np.ndarray  # (ticks,) [ns]
+    times: np.ndarray  # (ticks, nodes, segments) [ms] of SEGMENTS
 
     @property
     def totals(self) -> np.ndarray:

@@ -61,14 +61,13 @@ def percentile(values: np.ndarray, percent: float) -> tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Bin:
-    """The flights whose value is between low and high. completed: `share`; error: percentiles 5, 50
-    and 95."""
+    """The flights whose value is between low and high."""
 
     low: float
     high: float
     flights: int
-    completed: tuple[float, float, float]
-    error: tuple[float, float, float]
+    completed: tuple[float, float, float]  # `share`
+    error: tuple[float, float, float]  # percentiles 5, 50 and 95
 
 
 def sliced(values: np.ndarray, failed: np.ndarray, error: np.ndarray) -> list[Bin]:
@@ -102,16 +101,15 @@ WORST = 10  # flights that are listed
 
 
 class Flown:
-    """names: of the errors' coordinates; rms (flights, 6 + n) [m, deg]; drawn: name → value of each
-    flight; error: RMS of the distance to the reference [m]."""
+    """The results of the flights, as columns."""
 
     def __init__(self, results: Mapping[int, TrialResult]) -> None:
         """results: by the flight's number, at least one."""
         flights = list(results.values())
-        self.names = flights[0].coordinates
-        self.rms = np.array([one.rms for one in flights])
-        self.error = np.linalg.norm(self.rms[:, POSITION], axis=1)
-        self.drawn = {
+        self.names = flights[0].coordinates  # of the errors
+        self.rms = np.array([one.rms for one in flights])  # (flights, 6 + n) [m, deg]
+        self.error = np.linalg.norm(self.rms[:, POSITION], axis=1)  # [m] RMS from the reference
+        self.drawn = {  # name → value of each flight
             name: np.array([one.drawn[name] for one in flights]) for name in flights[0].drawn
         }
         self.numbers = np.array(list(results))

@@ -46,18 +46,14 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Draws(Sequence[Trial]):
-    """Random flights, drawn when they are looked at. Flight i depends on the seed and i, not on
-    `total`.
-
-    ranges: name → lowest and highest value; effects: of the plant, in every flight.
-    """
+    """Random flights, drawn when looked at. Flight i depends on the seed and i, not on `total`."""
 
     profile: Profile
     total: int
     seed: int
-    ranges: dict[str, tuple[float, float]]
+    ranges: dict[str, tuple[float, float]]  # name → lowest and highest value
     scenario: str = "pick_and_place"
-    effects: Effects = field(default_factory=dict)
+    effects: Effects = field(default_factory=dict)  # of the plant, in every flight
 
     def __post_init__(self) -> None:
         """Raise VariationError if a flight's seed would be too large."""

@@ -26,22 +26,17 @@ TABLES = (("position", POSITION), ("attitude", ATTITUDE), ("arm", ARM))
 
 @dataclass(frozen=True)
 class ControllerErrors:
-    """One controller. mean, half_width, worst (6 + n,): RMS errors, m and deg.
-
-    mean: over the flights that took off, NaN without any; half_width: of its confidence interval
-    over their seeds (of the means over the payloads), NaN for one seed; worst: largest RMS of any
-    of them. flown: their number; seeds: that of their seeds.
-    """
+    """One controller. mean, half_width, worst (6 + n,): RMS errors, m and deg."""
 
     label: str
     flights: int
-    flown: int
-    seeds: int
+    flown: int  # number of those that took off
+    seeds: int  # number of their seeds
     completed: int
     lost: int
-    mean: np.ndarray
-    half_width: np.ndarray
-    worst: np.ndarray
+    mean: np.ndarray  # over the flights that took off, NaN without any
+    half_width: np.ndarray  # confidence interval over seeds, of means over payloads; NaN: one seed
+    worst: np.ndarray  # largest RMS of any of them
     why: tuple[str, ...]
 
     @property

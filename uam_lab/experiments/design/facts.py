@@ -31,29 +31,20 @@ FILTERS = ("IMU_GYRO_CUTOFF", "IMU_DGYRO_CUTOFF", "MC_YAW_TQ_CUTOFF")
 
 @dataclass(frozen=True)
 class Facts:
-    """Numbers of a vehicle.
+    """Numbers of a vehicle."""
 
-    inertia (3,): about roll, pitch, yaw with the arm locked, the middle over the poses [kg m^2];
-    joints (n,): of each joint, the same [kg m^2]; poses: joint angles (n,) [rad] by their names;
-    torque (3,): largest in hover [N m]; scale (3,): of a normalised torque of 1 [N m]; lag (3,):
-    of rotors and filters of the torque [s]; dead: dead time of the rate loop [s]; slope: that of
-    its path of D in addition [s]; noise (3, 2, 2): P, D → variance of the command; seen: age of a
-    state at the law [s]; bus: age of a joint's sample when its torque acts [s]; servo
-    (n,): torque at which the supervisor holds [N m].
-    """
-
-    inertia: np.ndarray
-    joints: np.ndarray
-    poses: dict[str, tuple[float, ...]]
-    torque: np.ndarray
-    scale: np.ndarray
-    lag: np.ndarray
-    dead: float
-    slope: float
-    noise: np.ndarray
-    seen: float
-    bus: float
-    servo: np.ndarray
+    inertia: np.ndarray  # (3,) [kg m^2] roll, pitch, yaw; arm locked, the middle over the poses
+    joints: np.ndarray  # (n,) [kg m^2] of each joint, the middle over the poses
+    poses: dict[str, tuple[float, ...]]  # joint angles (n,) [rad] by their names
+    torque: np.ndarray  # (3,) [N m] largest in hover
+    scale: np.ndarray  # (3,) [N m] of a normalised torque of 1
+    lag: np.ndarray  # (3,) [s] of rotors and filters of the torque
+    dead: float  # [s] dead time of the rate loop
+    slope: float  # [s] dead time of its path of D in addition
+    noise: np.ndarray  # (3, 2, 2) P, D → variance of the command
+    seen: float  # [s] age of a state at the law
+    bus: float  # [s] age of a joint's sample when its torque acts
+    servo: np.ndarray  # (n,) [N m] torque at which the supervisor holds
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> Self:

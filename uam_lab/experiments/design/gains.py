@@ -41,16 +41,15 @@ LEAST, STEPS = 1e-3, 40  # of 1 + d, and of its bisection
 
 
 class RateLoop(NamedTuple):
-    """P, I, D of one axis with K = 1; stiffness S K P [N m s/rad]; Mbar [kg m^2]; bandwidth
-    lambda_2 [rad/s]; limit: what keeps it from being faster."""
+    """P, I, D of one axis with K = 1."""
 
     p: float
     i: float
     d: float
-    stiffness: float
-    inertia: float
-    bandwidth: float
-    limit: str
+    stiffness: float  # S K P [N m s/rad]
+    inertia: float  # Mbar [kg m^2]
+    bandwidth: float  # lambda_2 [rad/s]
+    limit: str  # what keeps it from being faster
 
 
 def rate_loop(facts: Facts, axis: int, criteria: SimpleNamespace, share: float) -> RateLoop:
@@ -98,13 +97,12 @@ def _exceeded(facts: Facts, axis: int, criteria: SimpleNamespace, sum_: float) -
 
 @dataclass(frozen=True)
 class Bandwidths:
-    """rates: the autopilot's loops about roll, pitch, yaw; attitude (3,): lambda_1 / lambda_2;
-    position (3,), arm (n,): lambda_2; all in [rad/s]."""
+    """Bandwidths of the loops, all in [rad/s]."""
 
-    rates: tuple[RateLoop, ...]
-    attitude: np.ndarray
-    position: np.ndarray
-    arm: np.ndarray
+    rates: tuple[RateLoop, ...]  # of the autopilot, about roll, pitch, yaw
+    attitude: np.ndarray  # (3,) lambda_1 / lambda_2
+    position: np.ndarray  # (3,) lambda_2
+    arm: np.ndarray  # (n,) lambda_2
 
 
 def autopilot_gains(found: Bandwidths) -> dict[str, float]:

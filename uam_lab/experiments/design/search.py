@@ -57,18 +57,13 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True)
 class Design:
-    """A designed vehicle.
+    """A designed vehicle."""
 
-    described: with the designed gains of the autopilot; profile: for it; cases: the analysed
-    operating points; faults: loop → why its bandwidth must change, {} of one with all margins;
-    limits: loop → what keeps it from being faster.
-    """
-
-    described: VehicleDescription
-    profile: Profile
-    cases: tuple[Case, ...]
-    faults: dict[str, Fault]
-    limits: dict[str, str] = field(default_factory=dict)
+    described: VehicleDescription  # with the designed gains of the autopilot
+    profile: Profile  # for it
+    cases: tuple[Case, ...]  # the analysed operating points
+    faults: dict[str, Fault]  # loop → why its bandwidth must change, {} of one with all margins
+    limits: dict[str, str] = field(default_factory=dict)  # loop → what keeps it from being faster
 
     @property
     def summary(self) -> str:

@@ -34,18 +34,16 @@ MILLI, NOTHING = 1e3, float("nan")
 
 @dataclass(frozen=True)
 class Duel:
-    """A duel. rows: label → profile; loads: scenario → mass [kg] of the payload that it picks;
-    published: label → scenario → figures in the order of `report.MEASURES`, of a pick `PICKED`;
-    hover: "" for none; delays [ms]: of the setpoints, growing, each tried in the hover."""
+    """A duel. Figures are in the order of `report.MEASURES`, those of a pick of `PICKED`."""
 
     vehicle: VehicleDescription
     plant: tuple[str, ...]
-    loads: dict[str, float]
-    hover: str
+    loads: dict[str, float]  # scenario → mass [kg] of the payload that it picks
+    hover: str  # "" for none
     seeds: int
-    delays: tuple[float, ...]
-    rows: dict[str, Profile]
-    published: dict[str, dict[str, tuple[float, ...]]]
+    delays: tuple[float, ...]  # [ms] of the setpoints, growing, each tried in the hover
+    rows: dict[str, Profile]  # label → profile
+    published: dict[str, dict[str, tuple[float, ...]]]  # label → scenario → figures
 
     @property
     def scenarios(self) -> tuple[str, ...]:
@@ -56,26 +54,23 @@ class Duel:
 @dataclass(frozen=True)
 class DuelResult(Ended):
     """One flight: RMS errors where `judged`, of a pick those of the flight, NaN for a hover or an
-    early end: end effector, platform [m], heading [deg], worst joint [deg]; standing [m]: mean
-    offset of the end effector in hover; outcome: one of `outcome.OUTCOMES`. Of a pick: largest,
-    lift, set_down [m]: largest deviation of the platform, in the flight and while the load changes;
-    rho: of the largest; placed [m]: of the payload from its goal."""
+    early end."""
 
     row: str
     scenario: str
     seed: int
     delay: float
-    hand: float
-    platform: float
-    heading: float
-    joint: float
-    standing: float
-    outcome: str
-    largest: float = NOTHING
-    lift: float = NOTHING
-    set_down: float = NOTHING
-    rho: float = NOTHING
-    placed: float = NOTHING
+    hand: float  # [m] end effector
+    platform: float  # [m]
+    heading: float  # [deg]
+    joint: float  # [deg] worst joint
+    standing: float  # [m] mean offset of the end effector in hover
+    outcome: str  # one of `outcome.OUTCOMES`
+    largest: float = NOTHING  # [m] of a pick: largest deviation of the platform in the flight
+    lift: float = NOTHING  # [m] of a pick: the same around the lift
+    set_down: float = NOTHING  # [m] of a pick: the same around the set-down
+    rho: float = NOTHING  # of a pick: of the largest
+    placed: float = NOTHING  # [m] of a pick: of the payload from its goal
 
 
 ROWS = Rows(DuelResult)

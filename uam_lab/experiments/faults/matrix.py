@@ -28,12 +28,11 @@ AND = " and another"  # after the name of the first fault of two
 
 @dataclass(frozen=True)
 class Promise:
-    """outcomes: the allowed ones of OUTCOMES; within [s]: longest time from the fault to the final
-    touchdown, if the mission is not completed; because: part of the reason."""
+    """What a flight with a fault promises."""
 
-    outcomes: tuple[str, ...]
-    within: float = math.inf
-    because: str = ""
+    outcomes: tuple[str, ...]  # the allowed ones of OUTCOMES
+    within: float = math.inf  # [s] longest time from fault to final touchdown, if not completed
+    because: str = ""  # part of the reason
 
     def kept(self, outcome: str, down_after: float | None, why: str) -> bool:
         """Return whether a flight kept the promise.
@@ -76,19 +75,16 @@ class Cell:
 
 @dataclass(frozen=True)
 class Matrix:
-    """Flights of a campaign. moments: entries with the times by name; promises: one per row;
-    left_out: row or moment → why this flight cannot have it; own_moments: of each row, () for all.
-    draws: number of random flights in place of one per cell, with `durations` for rows without
-    their own."""
+    """Flights of a campaign."""
 
     scenario: str
-    moments: dict[str, dict[str, Any]]
+    moments: dict[str, dict[str, Any]]  # entries with the times by name
     faults: tuple[dict[str, Any], ...]
-    promises: tuple[Promise | None, ...]
-    left_out: Mapping[str, str] = field(default_factory=dict)
-    own_moments: tuple[tuple[str, ...], ...] = ()
-    draws: int = 0
-    durations: tuple[Any, ...] = ()
+    promises: tuple[Promise | None, ...]  # one per row
+    left_out: Mapping[str, str] = field(default_factory=dict)  # row or moment → reason
+    own_moments: tuple[tuple[str, ...], ...] = ()  # of each row, () for all
+    draws: int = 0  # number of random flights in place of one per cell
+    durations: tuple[Any, ...] = ()  # of these, for rows without their own
 
     @property
     def rows(self) -> tuple[str, ...]:

@@ -15,37 +15,29 @@ from uam_lab.records.results.outcome import Outcome
 
 @dataclass(frozen=True, kw_only=True)
 class FaultTrial(Trial):
-    """One flight, of a cell of the matrix; lab: name or file of a rehearsal; broken: folder of the
-    rehearsals that broke a promise."""
+    """One flight, of a cell of the matrix."""
 
     cell: Cell
-    lab: str = ""
-    broken: Path = Path()
+    lab: str = ""  # name or file of a rehearsal
+    broken: Path = Path()  # folder of the rehearsals that broke a promise
 
 
 @dataclass(frozen=True)
 class FaultResult:
-    """Result of one flight. why: unmet criteria of a completed mission, notes of the flight.
-
-    down_after_s: from the fault to the final touchdown, None if the mission was completed or
-    without touchdown. kept: whether the promise was kept, None without a promise. worst: largest
-    errors of the flight, with the keys of `max` in metrics.json. happened: the injected faults, see
-    `faults.timeline.record`. given: the faults as option texts; tilt_deg: the largest; impact:
-    speed at the ground [m/s]; None without a recording.
-    """
+    """Result of one flight. worst: largest errors, with the keys of `max` in metrics.json."""
 
     fault: str
     moment: str
     outcome: str
-    why: str
+    why: str  # unmet criteria of a completed mission, notes of the flight
     duration_s: float
     worst: Mapping[str, list[float | None]] = field(default_factory=dict)
-    happened: tuple[dict[str, Any], ...] = ()
-    down_after_s: float | None = None
-    kept: bool | None = None
-    given: str = ""
-    tilt_deg: float | None = None
-    impact: float | None = None
+    happened: tuple[dict[str, Any], ...] = ()  # the injected faults, see `faults.timeline.record`
+    down_after_s: float | None = None  # fault to final touchdown; None: completed, or no touchdown
+    kept: bool | None = None  # whether the promise was kept, None without a promise
+    given: str = ""  # the faults as option texts
+    tilt_deg: float | None = None  # the largest, None without a recording
+    impact: float | None = None  # speed at the ground [m/s], None without a recording
 
 
 def measure(trial: FaultTrial) -> FaultResult:

@@ -26,17 +26,13 @@ LEAST_GAIN, MOST_PEAK = 3.0, 4.0  # [dB]; largest sensitivity
 
 @dataclass(frozen=True)
 class Case:
-    """One operating point.
+    """One operating point."""
 
-    label: payload and gains; rho: effective gain rho of each subsystem; sliding: the fastest mode
-    without dry friction of the joints.
-    """
-
-    label: str
+    label: str  # payload and gains
     stack: Stack
     analysis: Analysis
-    rho: dict[str, float]
-    sliding: GrowingMode
+    rho: dict[str, float]  # effective gain rho of each subsystem
+    sliding: GrowingMode  # the fastest mode without dry friction of the joints
 
 
 def smallest_delay(cases: Sequence[Case]) -> tuple[float, str]:

@@ -25,17 +25,14 @@ TINY = 1e-30  # of a loop or an eigenvalue: one that acts on nothing is 0
 
 @dataclass(frozen=True)
 class LinearBlock:
-    """A linear system with m inputs, p outputs and n states; the time step is that of the model.
+    """A linear system with m inputs, p outputs and n states; the time step is that of the model."""
 
-    a (n, n), b (n, m), c (p, n), d (p, m); inputs (m), outputs (p): names of the signals.
-    """
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    d: np.ndarray
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    a: np.ndarray  # (n, n)
+    b: np.ndarray  # (n, m)
+    c: np.ndarray  # (p, n)
+    d: np.ndarray  # (p, m)
+    inputs: tuple[str, ...]  # (m) names of the signals
+    outputs: tuple[str, ...]  # (p) names of the signals
 
     def response(self, z: np.ndarray) -> np.ndarray:
         """Return the transfer matrices (k, p, m) at the complex numbers z (k,)."""
@@ -215,21 +212,15 @@ def _write(arrays: Sequence[np.ndarray], values: np.ndarray) -> None:
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop; inf or NaN where the loop has no such crossing.
+    """Margins of one loop; inf or NaN where the loop has no such crossing."""
 
-    crossover [rad/s]: highest frequency with |L| = 1. phase [deg]: smallest phase margin. gain
-    [dB]: by which the gain may grow; gain_down [dB]: by which it may fall. delay [s]: that may be
-    added. bandwidth [Hz]: highest frequency at which |L / (1 + L)| falls below -3 dB. peak: largest
-    |1 / (1 + L)|.
-    """
-
-    crossover: float
-    phase: float
-    gain: float
-    gain_down: float
-    delay: float
-    bandwidth: float
-    peak: float
+    crossover: float  # [rad/s] highest frequency with |L| = 1
+    phase: float  # [deg] smallest phase margin
+    gain: float  # [dB] by which the gain may grow
+    gain_down: float  # [dB] by which it may fall
+    delay: float  # [s] that may be added
+    bandwidth: float  # [Hz] highest frequency at which |L / (1 + L)| falls below -3 dB
+    peak: float  # largest |1 / (1 + L)|
 
 
 def margins(omega: np.ndarray, loop: np.ndarray) -> Margins:

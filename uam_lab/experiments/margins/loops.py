@@ -42,20 +42,14 @@ class GrowingMode(NamedTuple):
 
 @dataclass(frozen=True)
 class Analysis:
-    """Margins of all loops of a stack at one operating point.
+    """Margins of all loops of a stack at one operating point."""
 
-    omega (k,) [rad/s]; loops: name → L (k,), margins; setpoint_delay [s]: by which the whole
-    setpoint may come later; hand_delay [s]: by which the correction of the hand may, None: it is
-    off; mode: the fastest-growing one; closed: the closed system, with inputs IN + signal that are
-    added.
-    """
-
-    omega: np.ndarray
-    loops: dict[str, tuple[np.ndarray, Margins]]
-    setpoint_delay: float
-    hand_delay: float | None
-    mode: GrowingMode
-    closed: LinearBlock
+    omega: np.ndarray  # (k,) [rad/s]
+    loops: dict[str, tuple[np.ndarray, Margins]]  # name → L (k,), margins
+    setpoint_delay: float  # [s] by which the whole setpoint may come later
+    hand_delay: float | None  # [s] by which the correction of the hand may, None: it is off
+    mode: GrowingMode  # the fastest-growing one
+    closed: LinearBlock  # the closed system, with inputs IN + signal that are added
 
     @property
     def stable(self) -> bool:

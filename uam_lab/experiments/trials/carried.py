@@ -28,14 +28,12 @@ FOLDERS = ("meshdir", "texturedir", "assetdir")  # of MuJoCo's element `compiler
 
 @dataclass(frozen=True)
 class Carried:
-    """scenario: as it was read, None for one of config/. model: the MJCF file, relative to config/,
-    or to `files` if there are any; files: content by relative path; gripper: its MJCF file, as
-    model, "" without."""
+    """Content of the files of a flight."""
 
-    scenario: Scenario | None
-    model: str
-    files: dict[str, bytes] = field(default_factory=dict)
-    gripper: str = ""
+    scenario: Scenario | None  # as it was read, None for one of config/
+    model: str  # the MJCF file, relative to config/, or to `files` if there are any
+    files: dict[str, bytes] = field(default_factory=dict)  # content by relative path
+    gripper: str = ""  # its MJCF file, as model, "" without
 
 
 def carried(scenario: str, profile: Profile) -> Carried:

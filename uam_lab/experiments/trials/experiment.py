@@ -30,18 +30,14 @@ Work = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Experiment:
-    """Flights of one kind, and the table of their results.
+    """Flights of one kind, and the table of their results."""
 
-    name: for the progress; table: its file; inputs: see `carried.inputs`; work: flies a trial
-    and returns its result.
-    """
-
-    name: str
-    table: Path
+    name: str  # for the progress
+    table: Path  # its file
     rows: Rows
-    inputs: Mapping[str, str]
+    inputs: Mapping[str, str]  # see `carried.inputs`
     place: Workplace
-    work: Work = measure
+    work: Work = measure  # flies a trial and returns its result
 
     def write_csv(self) -> None:
         """Write the table beside itself as CSV, for a spreadsheet."""

@@ -55,14 +55,13 @@ REST = 0.3  # [m/s] at the end
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a flight: height above the start [m], tilt [rad], speed [m/s], impact [m/s], and
-    the largest tilt of the flight [rad]."""
+    """The end of a flight."""
 
-    height: float
-    tilt: float
-    speed: float
-    impact: float
-    largest_tilt: float
+    height: float  # [m] above the start
+    tilt: float  # [rad]
+    speed: float  # [m/s]
+    impact: float  # [m/s]
+    largest_tilt: float  # [rad] of the flight
 
 
 def ending(series: Series) -> Ending:

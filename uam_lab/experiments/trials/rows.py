@@ -30,14 +30,11 @@ MARK = b"uam_rows_of"
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of results that are a dataclass, with a key.
+    """Rows of results that are a dataclass, with a key. Each of the `parts` of a field has a column
+    <field>.<name>. A field of another type than text, number or bool is JSON in its column."""
 
-    kind: the dataclass. parts: field with several numbers → their names; each has a column
-    <field>.<name>. A field of another type than text, number or bool is JSON in its column.
-    """
-
-    kind: type
-    parts: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    kind: type  # the dataclass
+    parts: Mapping[str, Sequence[str]] = field(default_factory=dict)  # field → names of its numbers
     key: pa.Field = NUMBER
 
     @property

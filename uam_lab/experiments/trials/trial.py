@@ -36,24 +36,20 @@ class TrialFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight of the profile's vehicle.
+    """One flight of the profile's vehicle."""
 
-    label: its row in the tables; keep: file for its time series, if any; carried: for a worker
-    without this machine's files; drawn: name → value of what was drawn at random.
-    """
-
-    label: str
+    label: str  # its row in the tables
     profile: Profile
     payload_mass: float  # [kg]
     seed: int
     scenario: str = "pick_and_place"  # name or file
     vehicle_changes: dict[str, object] = field(default_factory=dict)
-    keep: Path | None = None
+    keep: Path | None = None  # file for its time series, if any
     faults: Schedule = Schedule()
     engine: str = "direct"
     clock: str = "lockstep"
-    carried: Carried | None = None
-    drawn: dict[str, float] = field(default_factory=dict)
+    carried: Carried | None = None  # for a worker without this machine's files
+    drawn: dict[str, float] = field(default_factory=dict)  # name → value drawn at random
 
     @cached_property
     def flown_scenario(self) -> Scenario:
@@ -80,28 +76,21 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult(Ended):
-    """Result of a flight. rms, largest (6 + n,): errors of the `coordinates`, in m and
-    deg, NaN without a take-off.
-
-    flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
-    `outcome.OUTCOMES`; why: see `outcome.explained`. restless: RMS change from
-    tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
-    peaks: the largest value of each adaptation column; drawn: as in the trial.
-    """
+    """Result of a flight. rms, largest: errors of the `coordinates`, NaN without a take-off."""
 
     label: str
     payload_mass: float
     seed: int
-    rms: np.ndarray
-    largest: np.ndarray
-    flown: float
-    cut_short: bool
-    outcome: str
-    why: str
+    rms: np.ndarray  # (6 + n,) [m, deg]
+    largest: np.ndarray  # (6 + n,) [m, deg]
+    flown: float  # flown time / planned time
+    cut_short: bool  # not landed by the mission
+    outcome: str  # one of `outcome.OUTCOMES`
+    why: str  # see `outcome.explained`
     place_error: float | None
-    restless: tuple[float, float]
-    peaks: dict[str, float]
-    drawn: dict[str, float] = field(default_factory=dict)
+    restless: tuple[float, float]  # RMS change a tick: rate setpoints [rad/s], joint torques [N m]
+    peaks: dict[str, float]  # the largest value of each adaptation column
+    drawn: dict[str, float] = field(default_factory=dict)  # as in the trial
 
     @property
     def coordinates(self) -> tuple[str, ...]:

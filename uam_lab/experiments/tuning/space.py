@@ -23,12 +23,9 @@ class TuningError(ValueError):
 
 @dataclass(frozen=True)
 class Knob:
-    """One variable of the search: entries of a parameter with one common value, in log scale.
+    """One variable of the search: entries of a parameter with one common value, in log scale."""
 
-    nodes: the nodes whose parameter is set, usually one.
-    """
-
-    nodes: tuple[str, ...]
+    nodes: tuple[str, ...]  # those whose parameter is set, usually one
     parameter: str
     low: float
     high: float
@@ -82,17 +79,15 @@ class Cost:
 @dataclass(frozen=True)
 class Space:
     """A search: start profile, knobs, flights of an evaluation, cost.
-
-    delay_margin [s]: None for the cost alone; else the delay margin of the setpoint path is a
-    second objective, and the best profile is that of least cost with at least this margin.
-    """
+    With a `delay_margin` that of the setpoint path is a second objective, and the best profile is
+    that of least cost with at least this margin."""
 
     name: str
     start: Profile
     knobs: tuple[Knob, ...]
     flights: tuple[dict[str, Any], ...]
     cost: Cost
-    delay_margin: float | None = None
+    delay_margin: float | None = None  # [s]; None: the cost alone
 
     @property
     def start_values(self) -> dict[str, float]:

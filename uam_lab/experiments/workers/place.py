@@ -15,8 +15,7 @@ def cores() -> int:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where the work is done. scheduler: address of a Dask scheduler, "" for `jobs` processes of
-    this machine."""
+    """Where the work is done."""
 
     jobs: int
-    scheduler: str = ""
+    scheduler: str = ""  # address of a Dask scheduler, "" for `jobs` processes of this machine

@@ -58,13 +58,12 @@ class Places(NamedTuple):
 
 
 class RowLayout(NamedTuple):
-    """Where a tick's values go: places, the row of the truth, and three arrays each of the
-    published gains and of their columns."""
+    """Where a tick's values go."""
 
     at: Places
     truth: TruthRow
-    gains: tuple[np.ndarray, ...]
-    gain_columns: tuple[np.ndarray, ...]
+    gains: tuple[np.ndarray, ...]  # three arrays, the published ones
+    gain_columns: tuple[np.ndarray, ...]  # three arrays, of their columns
 
 
 # row: the next of the table. Ticks: first whose IMU sample has not arrived, the one after the
@@ -74,18 +73,17 @@ WHOLE, REAL = "row first following lag magnet", "time period"
 
 
 class RecordArrays(NamedTuple):
-    """table (rows, columns); ring (KEPT, ...): see `TickRecorder`; tau_alpha (n,); sent (4,),
-    bridge (1,): of `BridgeStage`; motors (rotors,): commands 0..1; numbers (1,): WHOLE, REAL."""
+    """Of the `TickRecorder`."""
 
-    table: np.ndarray
-    ring: np.ndarray
+    table: np.ndarray  # (rows, columns)
+    ring: np.ndarray  # (KEPT, ...) see `TickRecorder`
     layout: RowLayout
     signals: SignalArrays
-    tau_alpha: np.ndarray
-    sent: np.ndarray
-    bridge: np.ndarray
-    motors: np.ndarray
-    numbers: np.ndarray
+    tau_alpha: np.ndarray  # (n,)
+    sent: np.ndarray  # (4,) of `BridgeStage`
+    bridge: np.ndarray  # (1,) of `BridgeStage`
+    motors: np.ndarray  # (rotors,) commands 0..1
+    numbers: np.ndarray  # (1,) WHOLE, REAL
 
 
 class TickRecorder:

@@ -33,16 +33,11 @@ class CommandRefused(FlightError):
 
 @dataclass(frozen=True)
 class FlightResult:
-    """Result of a flight.
+    """Result of a flight."""
 
-    folder: with metrics.json, timeseries.parquet, log.mcap and logs/. metrics: content of
-    metrics.json, None if no control tick was recorded. outcome: facts of the engine, such as
-    transitions and faults.
-    """
-
-    folder: Path
-    metrics: dict[str, Any] | None
-    outcome: Outcome
+    folder: Path  # with metrics.json, timeseries.parquet, log.mcap and logs/
+    metrics: dict[str, Any] | None  # content of metrics.json, None if no control tick was recorded
+    outcome: Outcome  # facts of the engine, such as transitions and faults
 
     @property
     def completed(self) -> bool:
@@ -103,11 +98,8 @@ class FlightResult:
 
 
 class FlightFailed(FlightError):
-    """A technical failure ended the flight, for instance the loss of a node.
-
-    result: of the flight up to then.
-    """
+    """A technical failure ended the flight, for instance the loss of a node."""
 
     def __init__(self, reason: str, result: FlightResult) -> None:
         super().__init__(reason)
-        self.result = result
+        self.result = result  # of the flight up to then

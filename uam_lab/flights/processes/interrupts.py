@@ -11,13 +11,11 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest:
-    """Request to end a flight in order, or at once if it is repeated; and faults to inject now.
-
-    injected: queue of faults, each a `TimedFault` whose begin does not count.
-    """
+    """Request to end a flight in order, or at once if it is repeated; and faults to inject now."""
 
     def __init__(self) -> None:
         self.count = 0
+        # each fault is a `TimedFault` whose begin does not count
         self.injected: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def repeat(self, *_) -> None:

@@ -219,13 +219,10 @@ class FlightRun(NamedTuple):
 
 
 class Course(ExitStack):
-    """A kind of flight: its processes, and what it does while they run. A context manager.
-
-    children: its processes, listener: its status, from their start on.
-    """
+    """A kind of flight: its processes, and what it does while they run. A context manager."""
 
     children: Processes
-    listener: StatusListener | None = None
+    listener: StatusListener | None = None  # of its status, from the start of the processes on
 
     def __init__(self, flight: FlightRun) -> None:
         super().__init__()

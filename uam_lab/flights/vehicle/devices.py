@@ -33,13 +33,12 @@ Reports = Mapping[str, Report]
 
 @dataclass(frozen=True)
 class Device:
-    """One device. advice: how to check it; node: that reports it; found: by the report, whether it
-    is there, and text."""
+    """One device."""
 
     name: str
-    advice: str
-    node: str
-    found: Callable[[Report], tuple[bool, str]]
+    advice: str  # how to check it
+    node: str  # that reports it
+    found: Callable[[Report], tuple[bool, str]]  # by the report, whether it is there, and text
 
     def state(self, reports: Reports) -> DeviceState:
         """Return the state of the device by the reports of the nodes: name → report."""

@@ -70,34 +70,26 @@ class Page:
 
 @dataclass(frozen=True)
 class Lab:
-    """A checked lab file.
-
-    profile: names or files, () for the vehicle's own; scenario: name or file; autopilot: URL of its
-    link; imu: one of IMUS; mocap: None where another driver publishes the poses; arm: its servos,
-    arm_file: the file with them; nodes: node → parameter → value, beside those of the sections;
-    out: folder of the result folders; process: parameters of `ProcessParameters` of the nodes that
-    fly; fused: the control nodes are one process; gcs: URL of a ground station behind the bridge;
-    autopilot_system: MAVLink system id, PX4's MAV_SYS_ID.
-    """
+    """A checked lab file."""
 
     file: Path
     vehicle: VehicleDescription
-    profile: tuple[str, ...]
-    scenario: str
-    autopilot: str
-    imu: str
+    profile: tuple[str, ...]  # names or files, () for the vehicle's own
+    scenario: str  # name or file
+    autopilot: str  # URL of its link
+    imu: str  # one of IMUS
     room: Room
-    mocap: MocapParameters | None
-    arm: ArmChain
-    arm_file: Path
+    mocap: MocapParameters | None  # None where another driver publishes the poses
+    arm: ArmChain  # its servos
+    arm_file: Path  # the file with them
     magnet: Magnet
     cockpit: Page = Page()
-    nodes: dict[str, dict[str, Any]] = field(default_factory=dict)
-    out: Path = OUT
-    process: dict[str, Any] = field(default_factory=dict)
-    fused: bool = False
-    gcs: str = ""
-    autopilot_system: int = 1
+    nodes: dict[str, dict[str, Any]] = field(default_factory=dict)  # further parameters of nodes
+    out: Path = OUT  # folder of the result folders
+    process: dict[str, Any] = field(default_factory=dict)  # `ProcessParameters` of nodes that fly
+    fused: bool = False  # the control nodes are one process
+    gcs: str = ""  # URL of a ground station behind the bridge
+    autopilot_system: int = 1  # MAVLink system id, PX4's MAV_SYS_ID
 
 
 SHARED = (

@@ -48,13 +48,10 @@ NONE_CONNECTED: dict[str, int] = {}  # of the plant, which a vehicle has not
 
 
 class VehicleCourse(Course):
-    """The course of a vehicle's nodes: its devices, their connections, a landing by command.
+    """The course of a vehicle's nodes: its devices, their connections, a landing by command."""
 
-    without: nodes that are not started; optional: the flight continues without these.
-    """
-
-    without: Collection[str] = ()
-    optional: Collection[str] = OPTIONAL
+    without: Collection[str] = ()  # nodes that are not started
+    optional: Collection[str] = OPTIONAL  # the flight continues without these
 
     def __init__(self, lab: Lab, flight: FlightRun) -> None:
         super().__init__(flight)

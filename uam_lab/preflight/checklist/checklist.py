@@ -18,13 +18,12 @@ AUTOMATIC, GUIDED = "automatic", "guided"
 
 
 class Checklist:
-    """`findings`: of the automatic items; `steps`: of the guided ones; `entries`: the record,
-    the changes of items with the time [s] of the stamps."""
+    """The automatic items and the guided ones, with a record of them."""
 
     def __init__(self, steps: Sequence[Step]) -> None:
-        self.steps = list(steps)
-        self.findings: tuple[PreflightCheck, ...] = ()
-        self.entries: list[dict[str, Any]] = []
+        self.steps = list(steps)  # of the guided items
+        self.findings: tuple[PreflightCheck, ...] = ()  # of the automatic items
+        self.entries: list[dict[str, Any]] = []  # changes of items, with time [s] of the stamps
         self._time = 0.0
         self._armed = False
         self._noted: dict[str, tuple[str, str]] = {}

@@ -28,15 +28,12 @@ DIRECTIONS = ("forward", "left", "up")
 
 
 class Kind:
-    """What a motion is measured by. labels: of its components; unit: of all of them; axis: index
-    of the tested one; still: their largest change while a pose is kept.
+    """What a motion is measured by. axis: index of the tested component; still: largest change of
+    them while a pose is kept."""
 
-    commands, arm_released: see `Step`.
-    """
-
-    labels: tuple[str, ...]
-    unit = "rad"
-    commands = arm_released = False
+    labels: tuple[str, ...]  # of the components
+    unit = "rad"  # of all of them
+    commands = arm_released = False  # see `Step`
 
     def __init__(self, axis: int, limits: MotionLimits) -> None:
         self.axis, self.limits, self.still = axis, limits, limits.still_angle

@@ -26,22 +26,16 @@ GOOD, WARNING, BAD = "good", "warning", "bad"  # levels of a node
 
 @dataclass(frozen=True)
 class Sample:
-    """Newest values of all sensors at `time` [s].
-
-    position (3,) [m, world], attitude (4,) body → world [w x y z]: motion capture. gyro (4,): the
-    integral of the gyroscope, a quaternion from any beginning. force (3,) [m/s^2, FLU]: specific
-    force; rate (3,) [rad/s, FLU]: of the gyroscope. joints (n,) [rad]. commanded (3,) [rad/s, FLU]:
-    body rates of the newest setpoint.
-    """
+    """Newest values of all sensors at `time` [s]."""
 
     time: float
-    position: np.ndarray
-    attitude: np.ndarray
-    gyro: np.ndarray
-    force: np.ndarray
-    rate: np.ndarray
-    joints: np.ndarray
-    commanded: np.ndarray
+    position: np.ndarray  # (3,) [m, world] by motion capture
+    attitude: np.ndarray  # (4,) body → world [w x y z], by motion capture
+    gyro: np.ndarray  # (4,) integral of the gyroscope, a quaternion from any beginning
+    force: np.ndarray  # (3,) [m/s^2, FLU] specific force
+    rate: np.ndarray  # (3,) [rad/s, FLU] of the gyroscope
+    joints: np.ndarray  # (n,) [rad]
+    commanded: np.ndarray  # (3,) [rad/s, FLU] body rates of the newest setpoint
 
     @classmethod
     def mean(cls, samples: Sequence[Self]) -> Self:
@@ -194,36 +188,26 @@ class Box(NamedTuple):
 
 @dataclass(frozen=True)
 class Host:
-    """The companion computer. None: not known.
+    """The companion computer. None: not known."""
 
-    disk [bytes]: free for the recording; synchronised: by the kernel; jump [s]: of the clock since
-    the start; governors: of the cores, () without frequency scaling; rtprio: highest real-time
-    priority that is allowed.
-    """
-
-    disk: float | None = None
-    synchronised: bool | None = None
-    jump: float = 0.0
-    governors: tuple[str, ...] = ()
-    rtprio: float = 0.0
+    disk: float | None = None  # [bytes] free for the recording
+    synchronised: bool | None = None  # by the kernel
+    jump: float = 0.0  # [s] of the clock since the start
+    governors: tuple[str, ...] = ()  # of the cores, () without frequency scaling
+    rtprio: float = 0.0  # highest real-time priority that is allowed
 
 
 @dataclass(frozen=True)
 class Resting:
-    """Means of a short window of samples.
+    """Means of a short window of samples."""
 
-    position (3,) [m, world]; joints (n,) [rad]; tilt [rad]: by motion capture; gravity_angle [rad]:
-    between the vertical of accelerometer and motion capture; force [m/s^2]: its size; rate [rad/s]:
-    largest mean body rate; spread [m]: largest of the position.
-    """
-
-    position: np.ndarray
-    joints: np.ndarray
-    tilt: float
-    gravity_angle: float
-    force: float
-    rate: float
-    spread: float
+    position: np.ndarray  # (3,) [m, world]
+    joints: np.ndarray  # (n,) [rad]
+    tilt: float  # [rad] by motion capture
+    gravity_angle: float  # [rad] between the vertical of accelerometer and motion capture
+    force: float  # [m/s^2] its size
+    rate: float  # [rad/s] largest mean body rate
+    spread: float  # [m] largest of the position
 
     @classmethod
     def of(cls, samples: Sequence[Sample]) -> Self:
@@ -243,35 +227,28 @@ class Resting:
 
 @dataclass
 class Observation:
-    """All that is known now; None, NaN or empty: not known.
+    """All that is known now; None, NaN or empty: not known."""
 
-    expected: nodes that must run. pose_age [s]: mean age of a pose at its arrival. control_rate
-    [Hz]. stowed (n,) [rad]; joint_names (n,). temperatures [deg C] by joint; battery 0..1;
-    differences: of the autopilot's parameters from the required ones, one line each;
-    parameters_read: whether all of them have arrived; radio: whether the autopilot receives the
-    pilot's radio; fence: of the supervisor, room: of the lab file.
-    """
-
-    expected: tuple[str, ...]
-    joint_names: tuple[str, ...]
-    stowed: np.ndarray
-    control_rate: float
+    expected: tuple[str, ...]  # nodes that must run
+    joint_names: tuple[str, ...]  # (n,)
+    stowed: np.ndarray  # (n,) [rad]
+    control_rate: float  # [Hz]
     gravity: float = 9.81
     nodes: dict[str, NodeReport] = field(default_factory=dict)
     mocap: StreamReport | None = None
     imu: StreamReport | None = None
     joint_states: StreamReport | None = None
-    pose_age: float | None = None
+    pose_age: float | None = None  # [s] mean age of a pose at its arrival
     resting: Resting | None = None
-    temperatures: dict[str, float] = field(default_factory=dict)
-    battery: float = math.nan
+    temperatures: dict[str, float] = field(default_factory=dict)  # [deg C] by joint
+    battery: float = math.nan  # 0..1
     connected: bool = False
     armed: bool = False
     killed: bool | None = None
-    radio: bool | None = None
-    differences: tuple[str, ...] = ()
-    parameters_read: bool | None = None
-    fence: Box | None = None
-    room: Box | None = None
+    radio: bool | None = None  # whether the autopilot receives the pilot's radio
+    differences: tuple[str, ...] = ()  # of its parameters from the required ones, one line each
+    parameters_read: bool | None = None  # whether all of them have arrived
+    fence: Box | None = None  # of the supervisor
+    room: Box | None = None  # of the lab file
     preflight: tuple[PreflightCheck, ...] = ()
     host: Host = Host()

@@ -41,29 +41,24 @@ class StepState(Enum):
 
 @dataclass(frozen=True)
 class Situation:
-    """What the steps look at, at `time` [s].
-
-    sample: None until all sensors have sent; magnet: state that its driver reports, None without
-    one; killed: whether the kill switch is engaged, None if not known.
-    """
+    """What the steps look at, at `time` [s]."""
 
     time: float
-    sample: Sample | None = None
-    magnet: bool | None = None
-    killed: bool | None = None
+    sample: Sample | None = None  # None until all sensors have sent
+    magnet: bool | None = None  # state that its driver reports, None without one
+    killed: bool | None = None  # whether the kill switch is engaged, None if not known
 
 
 class Step:
     """Base of all steps.
 
-    name: machine-readable; needs: MOTION, CONFIRM or "" (nothing but time); seen: what is seen now.
-    commands: the mission computes body rates meanwhile; arm_released: the servos have no torque;
-    magnet: how it shall be switched, None for as it is. tries: how often the step was begun.
+    name: machine-readable; needs: MOTION, CONFIRM or "" (nothing but time); seen: what is seen now;
+    tries: how often the step was begun.
     """
 
-    commands = False
-    arm_released = False
-    magnet: bool | None = None
+    commands = False  # the mission computes body rates meanwhile
+    arm_released = False  # the servos have no torque
+    magnet: bool | None = None  # how it shall be switched, None for as it is
 
     def __init__(self, name: str, instruction: str, limit: str, needs: str) -> None:
         self.name, self._instruction, self.limit, self.needs = name, instruction, limit, needs

@@ -14,11 +14,10 @@ TOO_LATE = "no end within"
 
 @dataclass(frozen=True)
 class Said:
-    """Output of a child: `facts`: its lines of JSON, merged; `problem`: reason of a failure, empty
-    without one."""
+    """Output of a child."""
 
-    facts: dict[str, Any]
-    problem: str = ""
+    facts: dict[str, Any]  # its lines of JSON, merged
+    problem: str = ""  # reason of a failure, empty without one
 
 
 class CheckProcess:

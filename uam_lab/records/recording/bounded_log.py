@@ -15,20 +15,16 @@ MEGABYTE = 1_000_000
 
 
 class BoundedLog:
-    """One MCAP file with profile `ros2`. Not thread-safe.
-
-    ended: reason of the end of the log, "" while it is open. counts: messages per topic.
-    begin, end: least and largest log time [ns], 0 without messages.
-    """
+    """One MCAP file with profile `ros2`. Not thread-safe."""
 
     def __init__(self, file: Path, limit: float) -> None:
         """Create the file and its folder. limit [MB], 0 for none.
 
         Raises FileExistsError for an existing file, OSError if the file cannot be created.
         """
-        self.ended = ""
-        self.counts: Counter[str] = Counter()
-        self.begin = self.end = 0
+        self.ended = ""  # reason of the end of the log, "" while it is open
+        self.counts: Counter[str] = Counter()  # messages per topic
+        self.begin = self.end = 0  # [ns] least and largest log time, 0 without messages
         self._written = False
         self.file = file
         file.parent.mkdir(parents=True, exist_ok=True)

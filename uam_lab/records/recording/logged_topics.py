@@ -39,15 +39,12 @@ LABORATORY_FILE = "laboratory.json"
 
 @dataclass
 class Block:
-    """Messages with one layout: stamps (m,) [ns], names, and each field as (m, n) float64.
+    """Messages with one layout."""
 
-    order (m,): numbers of the messages within the topic; time_from_start: int64 [ns].
-    """
-
-    order: np.ndarray
-    stamps: np.ndarray
+    order: np.ndarray  # (m,) numbers of the messages within the topic
+    stamps: np.ndarray  # (m,) [ns]
     names: list[str]
-    fields: dict[str, np.ndarray]
+    fields: dict[str, np.ndarray]  # each (m, n) float64; time_from_start: int64 [ns]
 
 
 def read_blocks(type_name: str, messages: Sequence[bytes]) -> list[Block]:

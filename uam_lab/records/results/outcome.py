@@ -42,31 +42,23 @@ def grasp_decisions(
 
 @dataclass
 class Outcome:
-    """Result that an engine returns.
+    """Result that an engine returns."""
 
-    series: None without a recorded control tick. wall_s: wall time from first to last tick.
-    abort_reason: reason of the mission's abort. failure: technical reason of the flight's end, one
-    line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
-    parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
-    grasps: see `grasp_decision`; faults: see `faults.timeline.record`. errors_of: "" for errors
-    truth − reference, else what stands for the truth. done: whether a log has the mission's end.
-    """
-
-    series: Series | None
-    wall_s: float = 0.0
-    abort_reason: str = ""
-    failure: str = ""
-    details: Sequence[str] = ()
+    series: Series | None  # None without a recorded control tick
+    wall_s: float = 0.0  # wall time from first to last tick
+    abort_reason: str = ""  # reason of the mission's abort
+    failure: str = ""  # technical reason of the flight's end, one line
+    details: Sequence[str] = ()  # last lines of the node's log
     interrupted: bool = False
-    latency_s: Sequence[float] | None = None
-    missed_ticks: int | None = None
+    latency_s: Sequence[float] | None = None  # (ticks,) realtime only
+    missed_ticks: int | None = None  # realtime only
     notes: list[str] = field(default_factory=list)
-    parameter_changes: list[dict[str, Any]] = field(default_factory=list)
-    transitions: list[dict[str, Any]] = field(default_factory=list)
-    grasps: list[dict[str, Any]] = field(default_factory=list)
-    faults: list[dict[str, Any]] = field(default_factory=list)
-    errors_of: str = ""
-    done: bool = False
+    parameter_changes: list[dict[str, Any]] = field(default_factory=list)  # see `log_reader`
+    transitions: list[dict[str, Any]] = field(default_factory=list)  # see `transition`
+    grasps: list[dict[str, Any]] = field(default_factory=list)  # see `grasp_decision`
+    faults: list[dict[str, Any]] = field(default_factory=list)  # see `faults.timeline.record`
+    errors_of: str = ""  # "" for errors truth − reference, else what stands for the truth
+    done: bool = False  # whether a log has the mission's end
 
     @property
     def partial(self) -> bool:

@@ -29,16 +29,13 @@ class UnreadableUlog(UnreadableFlight):
 
 @dataclass(frozen=True)
 class Px4Log:
-    """Columns by our names: (time [s], values), and how well the clocks agree.
+    """Columns by our names, and how well the clocks agree. Where a station moves PX4's
+    origin, the values are from ours."""
 
-    offset: mission time minus PX4's [s]; correlation of the setpoints there, 0..1. origins: ours
-    minus PX4's [m], by column, where they differ: a station moves PX4's. The values are from ours.
-    """
-
-    columns: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    offset: float
-    correlation: float
-    origins: Mapping[str, float] = field(default_factory=dict)
+    columns: Mapping[str, tuple[np.ndarray, np.ndarray]]  # (time [s], values)
+    offset: float  # mission time minus PX4's [s]
+    correlation: float  # of the setpoints there, 0..1
+    origins: Mapping[str, float] = field(default_factory=dict)  # ours minus PX4's [m], by column
 
 
 def read(file: Path, series: Series) -> Px4Log:

@@ -89,15 +89,12 @@ class DrawnFlight:
 
 @dataclass(frozen=True)
 class Panel:
-    """One axis over time: label with unit, column of the table, factor to the unit of the label.
-
-    Ticks on the ground are drawn only with `on_ground`.
-    """
+    """One axis over time: label with unit, column of the table, factor to the unit of the label."""
 
     label: str
     column: str
     factor: float = 1.0
-    on_ground: bool = False
+    on_ground: bool = False  # ticks on the ground are drawn, too
 
 
 def window(flights: Sequence[DrawnFlight]) -> tuple[float, float]:
