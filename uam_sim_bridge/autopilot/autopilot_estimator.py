@@ -198,15 +198,12 @@ def moved_on(
 
 
 class Estimator:
-    """The filter with the state of its vision input; NED and FRD throughout.
-
-    `estimate` (10,): attitude quaternion, position [m], velocity [m/s].
-    """
+    """The filter with the state of its vision input; NED and FRD throughout."""
 
     _vision_time, _vision_count = Number(), Number()
 
     def __init__(self) -> None:
-        self.estimate = np.zeros(_END)
+        self.estimate = np.zeros(_END)  # attitude quaternion, position [m], velocity [m/s]
         self.estimate[0] = 1.0
         self.memory = record("newest vision_count", "vision_time")
         self._vision_time = -math.inf

@@ -51,11 +51,9 @@ BUS_DEVICE, SERIAL_NEAR, SERIAL_FAR, USB = "ttyARM", "ttyTELEM2", "ttyAUTOPILOT"
 class Laboratory:
     """Plant and devices; `step` advances one control period.
 
-    `bus`, `cable`, `mocap`, `hil`: the devices; `grip`: the person's hands; `folded` (n,): the
-    arm at the start [rad], as which hands hold it until the servos are first driven.
-    `timeline`: of the faults after the start, see `pull_cables`. `imu_plugged`: whether the
-    companion's own IMU is there; `poses_come`: whether another's driver of the motion capture has
-    poses.
+    `folded` (n,): the arm at the start [rad], as which hands hold it until the servos are first
+    driven. `imu_plugged`: whether the companion's own IMU is there; `poses_come`: whether another's
+    driver of the motion capture has poses.
     """
 
     def __init__(
@@ -82,8 +80,8 @@ class Laboratory:
         warm_up(plant())
         self.parameters = p
         self.wiring = wiring or Schedule()
-        self.timeline = Timeline(self.wiring)
-        self.grip = Grip()
+        self.timeline = Timeline(self.wiring)  # of the faults after the start, see `pull_cables`
+        self.grip = Grip()  # the person's hands
         self.folded = np.array(start or vehicle.description.stowed, dtype=float)
         self._driven = False  # whether the servos have had a command
         self._weight = vehicle.numbers["mass"] * vehicle.numbers["gravity"]

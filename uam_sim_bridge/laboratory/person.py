@@ -90,17 +90,14 @@ class Leg:
 
 
 class Person:
-    """Follows the steps; `grip`: the hands now; `wishes_to_confirm`: the step's motion is over.
-
-    `done`: the steps done so far, for the record.
-    """
+    """Follows the steps."""
 
     def __init__(self, joint_names: tuple[str, ...], folded: Sequence[float]) -> None:
         """joint_names: of the vehicle, base to tip; folded (n,) [rad]: the arm on the ground."""
         self._names, self._folded = joint_names, np.array(folded, dtype=float)
-        self.grip = Grip()
-        self.wishes_to_confirm = False
-        self.done: list[str] = []
+        self.grip = Grip()  # the hands now
+        self.wishes_to_confirm = False  # the step's motion is over
+        self.done: list[str] = []  # steps done so far, for the record
         self._step = ""
         self._start: np.ndarray | None = None  # (6,) pose on the floor
         self._home: np.ndarray | None = None  # (6,) pose in the hands

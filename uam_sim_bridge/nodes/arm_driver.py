@@ -50,10 +50,7 @@ SLOWEST = 0.95  # share of the rate below which the bus counts as too slow
 
 
 class ArmDriverNode(UamNode):
-    """Publishes the joints as read, and drives them by the newest command.
-
-    `failure`: why the node ends, "" while it runs.
-    """
+    """Publishes the joints as read, and drives them by the newest command."""
 
     def __init__(self):
         super().__init__(NAME)
@@ -72,7 +69,7 @@ class ArmDriverNode(UamNode):
         mode, gain = (vehicle.numbers["servos"][name] for name in ("mode", "position_p_gain"))
         self.driver = ArmDriver(chain, parameters, mode, vehicle.control_period, gain)
         self._bus = LateDevice(self, self._started, (ArmError, BusLost))
-        self.failure = ""
+        self.failure = ""  # why the node ends
         self._velocity = None  # (n,) [rad/s] desired
         hand = [GRIPPER] if chain.gripper is not None else []
         self._writer = JointStateWriter([*self._names, *hand])

@@ -14,11 +14,7 @@ Device = TypeVar("Device")
 
 
 class LateDevice(Generic[Device]):
-    """Opens the device at the start, or at the attempt that succeeds.
-
-    `device`: None while it is absent; `problem`: why, in one line, "" with a device; `waits`: the
-    parameter.
-    """
+    """Opens the device at the start, or at the attempt that succeeds."""
 
     def __init__(
         self, node: UamNode, make: Callable[[], Device], errors: tuple[type[Exception], ...]
@@ -27,8 +23,8 @@ class LateDevice(Generic[Device]):
 
         Declares the parameter `wait_for_device` of the node.
         """
-        self.device: Device | None = None
-        self.problem = "not opened yet"
+        self.device: Device | None = None  # None: absent
+        self.problem = "not opened yet"  # why it is absent, in one line; "" with a device
         self._node, self._make, self._errors = node, make, errors
         self._due = 0.0  # [s] time.monotonic() of the next attempt
         self.waits = NodeParameters(node, DeviceWait, read_only=True).current.wait_for_device

@@ -121,10 +121,7 @@ class Overdue:
 
 
 class DynamixelBus:
-    """A line with servos that understand Protocol 2.0; not for several threads at once.
-
-    `alerts`: ids whose last answer reported a hardware error.
-    """
+    """A line with servos that understand Protocol 2.0; not for several threads at once."""
 
     def __init__(
         self, device: str, baud_rate: int, allowance: float, port: SerialPort | None = None
@@ -133,7 +130,7 @@ class DynamixelBus:
         serial device."""
         self.device, self.baud_rate = device, baud_rate
         self.port = port or SerialPort(device, allowance)
-        self.alerts: set[int] = set()
+        self.alerts: set[int] = set()  # ids whose last answer reported a hardware error
         self._overdue = Overdue()
         self._reader, self._read = PacketReader(), deque[Packet]()
         self._heard = False  # bytes since the last instruction

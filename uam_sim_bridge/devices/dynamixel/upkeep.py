@@ -25,10 +25,7 @@ SLOW_BLOCKS = {
 
 
 class Upkeep:
-    """Prepares, watches and ends the servos of a chain; fills their `health`.
-
-    `unprepared`: ids without torque; `turns` (n,) [counts]: see `ServoDescription.turned`.
-    """
+    """Prepares, watches and ends the servos of a chain; fills their `health`."""
 
     def __init__(
         self,
@@ -41,13 +38,13 @@ class Upkeep:
         self._bus, self._chain, self._p = bus, chain, parameters
         self._p_gain = position_p_gain
         self.health = [ServoHealth(servo.label, servo.joint) for servo in chain.servos]
-        self.turns = [0] * len(chain.servos)
+        self.turns = [0] * len(chain.servos)  # [counts] see `ServoDescription.turned`
         self.forget()
         self._order = cycle(product(SLOW_BLOCKS, range(len(chain.servos))))
 
     def forget(self) -> None:
         """Regard every servo as unprepared, as after a lost device."""
-        self.unprepared: set[int] = set(self._chain.ids)
+        self.unprepared: set[int] = set(self._chain.ids)  # without torque
         self._next_slow = -math.inf
 
     def count(self, i: int, answered: bool) -> None:

@@ -32,13 +32,10 @@ class ClockOffset:
     drift of the clocks. The offset is late by the least delay of the network, some 0.1 ms on a
     cable, and by nothing else: the time between exposure and transmission is known from the
     server's stamps.
-
-    `value` [s]: host − server at the newest message, None before the first; `drift`: of the offset
-    [s/s]; `jumps`: how often a clock was set.
     """
 
     def __init__(self) -> None:
-        self.jumps = 0
+        self.jumps = 0  # how often a clock was set
         self.restart()
 
     def restart(self) -> None:
@@ -48,7 +45,7 @@ class ClockOffset:
         self._begun = 0.0  # server's time [s] at which the present block began
         self._level = self.drift = 0.0  # line through (_at, _level)
         self._at = 0.0
-        self.value: float | None = None
+        self.value: float | None = None  # [s] host − server at the newest message
 
     def add(self, sent: float, arrival: float) -> None:
         """Take a message: sent [s] by the server's clock, arrival [s] by the host's."""

@@ -29,18 +29,15 @@ PAUSE = 0.001  # [s] between two looks whether a change is over
 
 
 class PseudoTerminal:
-    """A device like /dev/ttyUSB0 whose other end this program holds.
-
-    `device`: its path; `path`: the one for others, a link that may be given.
-    """
+    """A device like /dev/ttyUSB0 whose other end this program holds."""
 
     def __init__(self, link: Path | None = None) -> None:
         """link: path to create, which stays the same for the next device in its place."""
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.device = os.ttyname(self._slave)
-        self._link, self.path = link, str(link or self.device)
+        self.device = os.ttyname(self._slave)  # its path
+        self._link, self.path = link, str(link or self.device)  # path for others
         if link is not None:
             link.unlink(missing_ok=True)
             link.symlink_to(self.device)

@@ -55,18 +55,14 @@ class SlowSensors:
 
 
 class HilMessages:
-    """Encodes the sensors, takes the motor commands.
-
-    `motors` (n,): newest motor commands 0..1 in PX4's order, zero while disarmed; `controls` (16,):
-    all newest controls; `armed`: from HIL_ACTUATOR_CONTROLS; `stamp` [us]: of the newest sensors.
-    """
+    """Encodes the sensors, takes the motor commands."""
 
     def __init__(self, motors: int, seed: int) -> None:
         """motors: their number; seed: of the noise of magnetometer and barometer."""
-        self.motors = np.zeros(motors)
-        self.controls = np.zeros(CONTROLS)
-        self.armed = False
-        self.stamp = 0
+        self.motors = np.zeros(motors)  # newest commands 0..1 in PX4's order, zero while disarmed
+        self.controls = np.zeros(CONTROLS)  # all newest ones
+        self.armed = False  # from HIL_ACTUATOR_CONTROLS
+        self.stamp = 0  # [us] of the newest sensors
         self._codec = Codec(1, 200)
         self._framer = Framer(self._codec)
         self._prepared = b""

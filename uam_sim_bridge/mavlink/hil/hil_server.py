@@ -34,11 +34,7 @@ def open_only_here(address: str) -> bool:
 
 
 class HilServer(HilMessages):
-    """TCP server for one autopilot at a time.
-
-    `answered`: whether the last tick was answered; `missed`: number of ticks without an answer
-    after the first answer.
-    """
+    """TCP server for one autopilot at a time."""
 
     def __init__(
         self,
@@ -54,8 +50,8 @@ class HilServer(HilMessages):
         """
         super().__init__(motors, seed)
         self._waits = waits
-        self.answered = False
-        self.missed = 0
+        self.answered = False  # whether the last tick was
+        self.missed = 0  # ticks without an answer after the first answer
         self._ever = False
         self._link: socket.socket | None = None
         self._listener = bound("TCP", host, port, f"the autopilot at {host}")

@@ -57,13 +57,10 @@ EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 
 
 class OffboardLink(FlightState):
-    """State of the autopilot from its messages, and the messages to it.
+    """State of the autopilot from its messages, and the messages to it; see `FlightState`.
 
-    See `FlightState`. `parameters`: comparison of the watched and required ones; `ignored`: number
-    of messages from other systems or for other receivers; `vitals`: battery, estimator and sensors;
-    `reboots`: number of restarts; `foreign`: system ids of other autopilots whose heartbeats have
-    come; `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
-    `alive`: connected at the last `maintain`; `transport`, `codec`, `framer`: of the messages.
+    `ignored`: number of messages from other systems or for other receivers; `reboots`: number of
+    restarts.
     """
 
     def __init__(
@@ -84,17 +81,17 @@ class OffboardLink(FlightState):
         self._clock = clock
         self.sequence = sequence
         self.ignored = self.reboots = 0
-        self.foreign: set[int] = set()
-        self.vitals = Vitals()
+        self.foreign: set[int] = set()  # system ids of other autopilots whose heartbeats have come
+        self.vitals = Vitals()  # battery, estimator and sensors
         self.time_sync = TimeSync()
         self.imu = AutopilotImu(self.time_sync) if imu_rate else None
-        self.magnet: AutopilotMagnet | None = None
+        self.magnet: AutopilotMagnet | None = None  # on one of its outputs, if the owner sets it
         self.streams = StreamCheck({HIGHRES_IMU: imu_rate} if imu_rate else None)
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
         self._firmware = spoken = sequence.firmware
         self._events = EventReader(spoken)
-        self.parameters = ParameterWatch(mapping, required, spoken)
+        self.parameters = ParameterWatch(mapping, required, spoken)  # watched and required ones
         self.transport = transport
         self._target = target_system
         self.codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
@@ -103,7 +100,7 @@ class OffboardLink(FlightState):
         self._pending: dict[int, Request] = {}
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
         self.heard = -math.inf
-        self.alive = False
+        self.alive = False  # connected at the last `maintain`
         self._told_unsigned = False
 
     @property

@@ -80,15 +80,14 @@ class Signing:
 class Codec:
     """Encodes messages of one sender (system and component id) and decodes those of others.
 
-    With `signing` it signs every frame and decodes only frames with a valid signature. `unsigned`:
-    MAV_AUTOPILOT of the newest heartbeat refused because it has no signature, None without one.
+    With `signing` it signs every frame and decodes only frames with a valid signature.
     """
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
         self._mav = mavlink2.MAVLink(None, srcSystem=system, srcComponent=component)
         self._signing, self._signed = signing, self._mav.signing
         self._accepted: dict[tuple[int, int, int], int] = {}  # times of the senders
-        self.unsigned: int | None = None
+        self.unsigned: int | None = None  # MAV_AUTOPILOT of the newest heartbeat without signature
         if signing is not None:
             self._signed.secret_key, self._signed.link_id = signing.key, signing.link_id
             self._signed.sign_outgoing = True
@@ -146,14 +145,13 @@ class Codec:
 class Framer:
     """Extracts messages from a byte stream (TCP, serial) or from single datagrams.
 
-    `bad_bytes`: number of bytes outside valid frames; `unread`: number of frames of messages in
-    UNREAD. A frame that the codec refuses for its signature is skipped whole.
+    A frame that the codec refuses for its signature is skipped whole.
     """
 
     def __init__(self, codec: Codec) -> None:
         self._codec = codec
         self._rest = b""
-        self.bad_bytes = self.unread = 0
+        self.bad_bytes = self.unread = 0  # bytes outside valid frames; frames of messages in UNREAD
 
     def stream(self, data: bytes) -> list[Message]:
         """Return the messages completed by `data`; store an incomplete frame for the next call."""

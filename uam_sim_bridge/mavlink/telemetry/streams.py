@@ -33,11 +33,7 @@ PERIOD = 1.0  # s, window of the rate
 
 
 class StreamCheck:
-    """Requests the streams and checks their rates.
-
-    `rates`: message id → rate [Hz] over the last window; `warnings`: one line per stream that is
-    too slow or was refused.
-    """
+    """Requests the streams and checks their rates."""
 
     def __init__(self, further: Mapping[int, float] | None = None) -> None:
         """further: streams besides RATES, message id → desired rate [Hz]."""
@@ -46,8 +42,8 @@ class StreamCheck:
 
     def restart(self) -> None:
         """Request all streams again, for a new or rebooted autopilot."""
-        self.warnings: tuple[str, ...] = ()
-        self.rates: dict[int, float] = {}
+        self.warnings: tuple[str, ...] = ()  # one line per stream that is too slow or was refused
+        self.rates: dict[int, float] = {}  # message id → rate [Hz] over the last window
         self._queue = [n for n in self._desired if n not in ONLY_COUNTED] + [*ON_CHANGE]
         self._attempts = dict.fromkeys((*self._desired, *ON_CHANGE), 0)
         self._refused: dict[int, str] = {}

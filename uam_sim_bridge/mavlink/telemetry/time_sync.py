@@ -38,23 +38,18 @@ _WRAP = 2**32 * 1e-3  # s, period of a 32-bit time in milliseconds: 49.7 days
 
 
 class TimeSync:
-    """Creates the TIMESYNC requests and estimates the offset from the answers.
-
-    `offset` [s] or None: autopilot's clock − companion's clock; `round_trip` [s] or None:
-    smoothed; `delivered` [s]: when the newest answered request was sent, inf before the first
-    answer.
-    """
+    """Creates the TIMESYNC requests and estimates the offset from the answers."""
 
     def __init__(self) -> None:
-        self.delivered = math.inf
+        self.delivered = math.inf  # [s] when the newest answered request was sent
         self._requested: deque[int] = deque(maxlen=_OUTSTANDING)
         self._last = -math.inf
         self.restart()
 
     def restart(self) -> None:
         """Discard the estimate, for a new or rebooted autopilot."""
-        self.offset: float | None = None
-        self.round_trip: float | None = None
+        self.offset: float | None = None  # [s] autopilot's clock − companion's clock
+        self.round_trip: float | None = None  # [s] smoothed
         self._count = self._jumps = 0
         self._recent: deque[float] = deque(maxlen=_RECENT)
 

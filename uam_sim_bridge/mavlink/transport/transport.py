@@ -45,8 +45,7 @@ class Transport(Protocol):
 class UdpTransport:
     """UDP between a local port and one peer; packets of other senders are ignored.
 
-    The local port is bound to loopback if the peer is on this machine. `dropped`: datagrams that
-    could not be sent.
+    The local port is bound to loopback if the peer is on this machine.
     """
 
     stream = False
@@ -62,7 +61,7 @@ class UdpTransport:
         """
         self._remote = (resolve(remote[0]), remote[1])
         self._read_limit = read_limit
-        self.dropped = 0
+        self.dropped = 0  # datagrams that could not be sent
         here = ipaddress.ip_address(self._remote[0]).is_loopback
         self._socket = bound("UDP", LOOPBACK if here else EVERYWHERE, local_port, "MAVLink")
         self._socket.setblocking(False)

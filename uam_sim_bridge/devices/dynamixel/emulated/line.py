@@ -30,9 +30,7 @@ _SPEEDS = {
 
 
 class ServoLine:
-    """Servos on one line; `instructions`: packets understood.
-
-    `bit_error_rate`: of every bit in both directions; `loss`: of a whole packet in either one.
+    """Servos on one line.
 
     Servos of one id answer at the same time: their bytes overlap and are damaged. In a Sync Read a
     servo waits for the one named before it; if that one is silent, so are all after it.
@@ -40,8 +38,8 @@ class ServoLine:
 
     def __init__(self, servos: Sequence[EmulatedServo], seed: int = 1) -> None:
         """seed: of the faults."""
-        self.servos, self.instructions = list(servos), 0
-        self.bit_error_rate = self.loss = 0.0
+        self.servos, self.instructions = list(servos), 0  # packets understood
+        self.bit_error_rate = self.loss = 0.0  # of every bit, of a whole packet, in both directions
         self._noise = np.random.default_rng(seed)
         self._reader = PacketReader()
 
@@ -172,10 +170,7 @@ def _word(data: bytes) -> int:
 
 
 class EmulatedBus:
-    """A pseudo-terminal with servos; `timing`: answers take as long as on the wire.
-
-    `line`: the servos and their faults; `port`: path of the device.
-    """
+    """A pseudo-terminal with servos; `timing`: answers take as long as on the wire."""
 
     def __init__(
         self,
@@ -187,10 +182,10 @@ class EmulatedBus:
     ) -> None:
         """latency_timer [s] of the USB adapter, before an answer; seed: of the faults; link: a path
         that stays the same when the cable is unplugged and plugged in again."""
-        self.line = ServoLine(servos, seed)
+        self.line = ServoLine(servos, seed)  # the servos and their faults
         self._timing, self._latency, self._link = timing, latency_timer, link
         self._terminal: PseudoTerminal | None = None
-        self.port = ""
+        self.port = ""  # path of the device
         self._thread = DeviceThread("emulated bus", self._serve)
         self.plug_in()
         self._thread.start()
