@@ -27,6 +27,7 @@ from uam_control.mission.mission_output import (
     LAND,
     LANDED,
     RELEASED,
+    TOUCHDOWN,
     WAITING,
     MagnetOverride,
     MissionOutput,
@@ -220,8 +221,8 @@ class FlightSequence:
             decision = self._supervisor.step(stamp, seen, None if moved else command)
             if guidance is not None:
                 guidance.write(stamp)
-                if self._odometry and decision.state is State.LANDING:
-                    seek_ground(output.reference, self._since_arrival(stamp))
+                if (since := self._since_arrival(decision)) > 0.0:
+                    seek_ground(output.reference, since)
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
                     guidance.stay(stamp, state, self._ground, self._age)
@@ -309,11 +310,13 @@ class FlightSequence:
         )
         return seen
 
-    def _since_arrival(self, stamp: float) -> float:
-        """Return for how long [s] the reference of a landing has been at its end."""
+    def _since_arrival(self, decision: Decision) -> float:
+        """Return for how long [s] a landing seeks the ground, as its reference is at its end."""
         guidance = self._guidance
-        if self._touchdown.late_in_descent(stamp):
-            return stamp - guidance.end
+        if not self._odometry or decision.state is not State.LANDING:
+            return 0.0
+        if self._touchdown.late_in_descent(self._stamp):
+            return self._stamp - guidance.end
         return guidance.scenario_time - self.scenario.landing.end
 
     def watch_payload(self) -> None:
@@ -471,6 +474,8 @@ class FlightSequence:
             return LANDED if ended in (Event.TOUCHDOWN, Event.DISARM_ON_GROUND) else ABORTED
         if decision.state is State.RELEASED:
             return RELEASED
+        if self._since_arrival(decision) > 0.0:
+            return TOUCHDOWN
         if decision.guide is Guide.SCENARIO:
             if self._guidance.planned:
                 return GOAL

@@ -11,7 +11,11 @@ from uam_control.supervision import State
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
 HAND_CHECK = "hand check"  # a person tilts the disarmed vehicle, see docs/preflight.md
-PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CHECK)
+TOUCHDOWN = "touchdown"  # a landing seeks the ground, see `ground.seek_ground`
+PHASES = (
+    *(WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CHECK),
+    TOUCHDOWN,
+)
 
 
 @dataclass

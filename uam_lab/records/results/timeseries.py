@@ -56,7 +56,7 @@ def of_the_hand(
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
 # Phases of the mission node on the ground; the scenario names those in flight.
-ON_GROUND = ("waiting", "landed", "aborted")
+ON_GROUND = ("waiting", "touchdown", "landed", "aborted")
 PHASE_COLUMN = "phase"
 METADATA_KEY = b"uam"
 
@@ -254,7 +254,8 @@ class Series:
         """Mask (ticks,): from the take-off command to the touchdown command.
 
         The touchdown command is the start of the phase "landed", in which the mission disarms the
-        vehicle. In an aborted flight it is the abort.
+        vehicle. In an aborted flight it is the abort. With an odometry it is the start of the phase
+        "touchdown", in which the landing seeks the ground.
         """
         on_ground = [name in ON_GROUND for name in self.phase_names]
         return (self.time >= 0.0) & ~np.array(on_ground)[self.phases]
