@@ -50,10 +50,7 @@ def ports_of(instance: int) -> Ports:
 
 
 def in_use(kind: int, port: int) -> bool:
-    """Return whether `port` of 127.0.0.1 cannot be bound.
-
-    kind: socket.SOCK_STREAM (TCP), SOCK_DGRAM (UDP).
-    """
+    """Return whether `port` of 127.0.0.1 cannot be bound; kind: SOCK_STREAM or SOCK_DGRAM."""
     with socket.socket(socket.AF_INET, kind) as probe:
         if kind == socket.SOCK_STREAM:  # ignore TIME_WAIT of a closed connection
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

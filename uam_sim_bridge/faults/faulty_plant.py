@@ -144,10 +144,7 @@ class FaultyPlant(Plant):
         return samples
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
-        """Step the inner plant, with commands and physics changed by the active faults.
-
-        Arguments as in `Plant.step`.
-        """
+        """Step the inner plant, with commands and physics changed by the active faults."""
         if self.acts:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_command), bool(magnet))
             described = self.vehicle.description

@@ -1,18 +1,9 @@
 """The faults of a flight and their times, read and checked from options, files and scenarios.
 
-The text of an option --fault:
-
-    NAME@SECONDS[+DURATION][:parameter=value,...]        mocap_dropout@20+3
-    NAME@PHASE[+AFTER[+DURATION]][:parameter=value,...]  motor_loss@pick+1:motor=2,remaining=0.7
-    NAME@start[:parameter=value,...]                     mavlink_delay@start:delay=0.02
-
-The entry of a file (a list, or a mapping with the list `faults`) and of a scenario's `faults`:
+The text of an option --fault: docs/faults.md. The entry of a file (a list, or a mapping with the
+list `faults`) and of a scenario's `faults`:
 
     - {fault: motor_loss, at: pick, after: 1, duration: 5, motor: 2, remaining: 0.7}
-
-A fault at a phase begins AFTER seconds after that phase begins in the flight, however late that is;
-it does not occur if the phase does not. A fault without a duration lasts until the flight ends. A
-fault at `start` acts from the first tick on, also before take-off, and lasts.
 """
 
 from __future__ import annotations

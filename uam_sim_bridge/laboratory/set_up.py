@@ -36,10 +36,7 @@ class RoomBody:
     def seen(
         self, position: np.ndarray, quaternion: np.ndarray
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return position x y z [m] and rotation x y z w as streamed.
-
-        position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, of base_link.
-        """
+        """See `mocap_server.Body`: as streamed."""
         c = self.calibration
         back = conjugate(c.world)
         pivot = matrix_from_quaternion(quaternion) @ np.array(c.pivot)

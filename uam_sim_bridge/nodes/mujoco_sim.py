@@ -1,23 +1,19 @@
 """The plant as a ROS node: physics in place of vehicle, motion capture, IMU and Dynamixels.
 
 For ROS it publishes sensors and truth, and subscribes to joint efforts and the magnet's switch. For
-the autopilot it is a simulator with MAVLink over TCP. Two clocks:
+the autopilot it is a simulator with MAVLink over TCP. Two clocks, see docs/architecture.md:
 
-lockstep  At every control tick the plant waits for the setpoint that the bridge sent for this
-          tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
-          It also waits for a recorder that is far behind, so that no message is lost.
-          It says whom it waits for. By hand a wait has a limit in wall time; in `uam fly` none:
-          it ends when no answer can come any more (`lockstep.py`).
+lockstep  The plant also waits for a recorder that is far behind, so that no message is lost.
+          By hand a wait has a limit in wall time; in `uam fly` none: it ends when no answer can
+          come any more (`lockstep.py`).
           With the autopilot's IMU (`publish_imu: false`) the autopilot gets its sample first, and
           passes it on. Ticks before the first setpoint run at the pace of the wall clock.
           While a lost node is restarted, ticks run at the pace of the wall clock without its
           answers, until all answers have been in time for IN_TIME ticks.
-realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
-          stall of the machine they run a quarter faster (`paced_clock.py`). Without an answer by
-          the next deadline the last command holds. The latency of a tick is the time from the
-          publication of its IMU sample to that of its setpoint. Beyond one control period the tick
-          counts as late. Beyond some periods, or without a setpoint, it counts as missed
-          (`plant_health.Statistics`).
+realtime  After a stall of the machine ticks run a quarter faster (`paced_clock.py`). Without an
+          answer by the next deadline the last command holds. The latency of a tick is the time from
+          the publication of its IMU sample to that of its setpoint. Beyond one control period the
+          tick counts as late (`plant_health.Statistics`).
           The bridge publishes /uam/setpoint after it has sent the setpoint to the autopilot.
 """
 

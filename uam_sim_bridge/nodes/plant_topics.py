@@ -89,9 +89,7 @@ class Sensors(Outlets):
         self._clock.publish(self._clock_writer.stamped(stamp))
 
     def publish(self, samples: Samples) -> int | None:
-        """Publish the samples of this tick; return the stamp [ns] of the tick.
-
-        None where no IMU sample of this node starts it.
+        """Publish this tick's samples; return its stamp [ns], None if no own IMU sample starts it.
 
         The IMU's is published last: it starts the estimator's tick. The stamp of the tick is the
         IMU's without jitter, a multiple of the control period.
@@ -131,10 +129,7 @@ class TruthTopics(Outlets):
         self._magnet_writer = JointStateWriter(["magnet", "swing", *_fingers(vehicle)])
 
     def publish(self, stamp: int, truth: Truth, motors: np.ndarray, magnet: bool) -> None:
-        """Publish the truth at `stamp` [ns].
-
-        motors (rotors,): last commands 0..1; magnet: last command.
-        """
+        """Publish the truth at `stamp` [ns], and the last commands; motors (rotors,): 0..1."""
         self.publish_state(stamp, truth)
         self._payload.publish(
             self._payload_writer.fill(stamp, truth.payload_position, truth.payload_quaternion)

@@ -127,8 +127,7 @@ def receive(sent: np.ndarray, tick: int, a: ServoArrays) -> None:
 
 @borrowing
 def joint_step(a: ServoArrays, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
-    """Write torque and output (n,) [N m] in the mode of the servos; angle (n,) [rad], velocity
-    (n,) [rad/s]."""
+    """Write torque and output (n,) [N m] in the servos' mode; angle, velocity (n,) [rad, rad/s]."""
     if a.loop[3] > 0.0:
         position_step(a, angle, velocity, output)
     else:

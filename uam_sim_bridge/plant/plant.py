@@ -38,10 +38,7 @@ class PlantError(ValueError):
 
 
 class PhysicsError(RuntimeError):
-    """The physics engine cannot go on; the plant must not be used again.
-
-    The text is one line that begins with BROKEN.
-    """
+    """The physics engine cannot go on; the plant must not be used again."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"{BROKEN}: {why}")

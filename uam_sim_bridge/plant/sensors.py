@@ -249,10 +249,8 @@ def disturbed(
     gyro: np.ndarray,
     accelerometer: np.ndarray,
 ) -> None:
-    """Write rates (3,) [rad/s] and specific force (3,) [m/s^2], FLU, plus noise and bias (6,).
-
-    They are written to gyro (3,) and accelerometer (3,).
-    """
+    """Write rates (3,) [rad/s] and specific force (3,) [m/s^2], FLU, plus noise and bias (6,), to
+    gyro (3,) and accelerometer (3,)."""
     for i in range(3):
         gyro[i] = rates[i] + noise[i] + bias[i]
         accelerometer[i] = specific_force[i] + noise[3 + i] + bias[3 + i]

@@ -191,10 +191,7 @@ def command(
 
 
 def add_px4_options(p: Program, required: str) -> None:
-    """Add the options of every program that runs a PX4: build, parameters, log.
-
-    required: what --px4-dir must be.
-    """
+    """Add the options of every program that runs a PX4; required: what --px4-dir must be."""
     p.option("--px4-dir", "DIR", required)
     text = f"parameters beside the vehicle's (default: {parameters.SIMULATION} of config/)"
     p.option("--params", "FILE", text, nargs="+")

@@ -62,10 +62,7 @@ class PositionControl(Cascade):
             self._integral[:], self._slope[:], self._velocity = 0.0, 0.0, None
 
     def update(self, target: PositionTarget, estimate: np.ndarray, dt: float) -> np.ndarray:
-        """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
-
-        estimate (10,): of `Estimator`; dt [s].
-        """
+        """Return body rates [rad/s, FRD], thrust (4,); estimate (10,): of `Estimator`; dt [s]."""
         p = self._parameters
         position, velocity = estimate[POSITION], estimate[VELOCITY]
         self._differentiate(velocity, dt)

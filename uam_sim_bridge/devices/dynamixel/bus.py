@@ -126,8 +126,7 @@ class DynamixelBus:
     def __init__(
         self, device: str, baud_rate: int, allowance: float, port: SerialPort | None = None
     ) -> None:
-        """allowance [s]: time that an answer has beside the time of its bytes; port: in place of a
-        serial device."""
+        """allowance [s]: time of an answer beside its bytes; port: in place of a serial device."""
         self.device, self.baud_rate = device, baud_rate
         self.port = port or SerialPort(device, allowance)
         self.alerts: set[int] = set()  # ids whose last answer reported a hardware error
@@ -240,10 +239,7 @@ class DynamixelBus:
         self.alerts.discard(servo)
 
     def _ask(self, packet: Packet, size: int) -> bytes:
-        """Send an instruction to one servo; return the `size` bytes of data of its answer.
-
-        Raises NoAnswer, Refused, BusLost.
-        """
+        """Ask one servo; return the `size` bytes of its data. Raises NoAnswer, Refused, BusLost."""
         instruction = Instruction(packet, size)
         with self.guarded():
             self._drop_late()

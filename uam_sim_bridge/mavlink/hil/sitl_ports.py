@@ -100,10 +100,7 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
 
 
 def within(kind: Callable[[str], float], what: str, low: float, high: float) -> Callable:
-    """Return an argparse type: a number of a kind, int or float, from `low` to `high`.
-
-    what: its name in errors.
-    """
+    """Return an argparse type: int or float from `low` to `high`; what: its name in errors."""
 
     def read(text: str) -> float:
         try:

@@ -99,10 +99,7 @@ class Codec:
         return self._signed.reject_count
 
     def encode(self, message: Message) -> bytes:
-        """Return the frame of `message` with the next sequence number.
-
-        Raises struct.error if a value does not fit its field.
-        """
+        """Return the numbered frame. Raises struct.error if a value does not fit its field."""
         self._set_time()
         frame = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256

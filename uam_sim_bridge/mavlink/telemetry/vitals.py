@@ -91,10 +91,7 @@ def names(flags: int, table: dict[int, str]) -> tuple[str, ...]:
 
 
 def estimate_faults(flags: int) -> tuple[str, ...]:
-    """Return one text per fault of the estimate; () if attitude and position are valid.
-
-    flags: ESTIMATOR_STATUS.flags.
-    """
+    """Return a text per fault in ESTIMATOR_STATUS.flags; () if attitude and position are valid."""
     faults = []
     if not flags & ATTITUDE:
         faults.append("no valid attitude estimate")

@@ -1,11 +1,6 @@
 """The interface `Transport` of MAVLink links, and `open_transport`, which opens one by URL.
 
-| URL | link |
-|---|---|
-| `udp:HOST:PORT` | datagrams to HOST:PORT, from a local port that the system chooses |
-| `udp:HOST:PORT:LOCAL` | the same, from local port LOCAL |
-| `tcp:HOST:PORT` | client; connects again after a loss |
-| `serial:DEVICE:BAUD` | serial line or USB; opened again after unplugging |
+The forms of a URL: docs/autopilot.md, Links. Without a local port the system chooses one.
 """
 
 import ipaddress
@@ -136,8 +131,7 @@ def open_transport(url: str, read_limit: int = READ_LIMIT, absent: bool = False)
     """Open the link of `url`.
 
     read_limit: bytes read per `receive` of a UDP link; absent: a serial device may be plugged in
-    later. Raises PortError in one line if the URL is
-    not of the table above or the link cannot be opened.
+    later. Raises PortError in one line if the URL has no such form or cannot be opened.
     """
     link = parse_url(url)
     if link.kind == "serial":

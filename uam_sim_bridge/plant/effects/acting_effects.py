@@ -36,10 +36,7 @@ class EffectArrays(NamedTuple):
 
 
 class ActingEffects:
-    """The effects of a flight on its plant; `acting`: those that act in it, by name.
-
-    `compiled`: whether none of them is in Python.
-    """
+    """The effects of a flight on its plant; `acting`: those that act in it, by name."""
 
     def __init__(self, effects: Mapping[str, Mapping], bench: Bench, seed: int) -> None:
         """effects: name → parameters, see `presets.read`; seed: of the flight."""
@@ -52,7 +49,7 @@ class ActingEffects:
                     self.acting[name] = one
         self._noises = [noise for one in self.acting.values() for noise in one.noises]
         hooks = {name: self._hooks(name) for name in HOOKS}
-        self.compiled = all(one.steps for one in self.acting.values())
+        self.compiled = all(one.steps for one in self.acting.values())  # none is in Python
         self._kept = hooks
         tables = (table(hooks[name]) for name in HOOKS)
         factor = bench.rotors.efficiency.copy()

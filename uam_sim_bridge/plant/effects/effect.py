@@ -100,8 +100,7 @@ class Acting:
         """Change the torques of the joints for the next physics step."""
 
     def imu(self, gyro: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU, as the effect changes
-        them."""
+        """Return gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU, with the effect."""
         return gyro, force
 
     def pose(self, pose: Pose) -> Pose | None:

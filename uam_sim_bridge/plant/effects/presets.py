@@ -1,11 +1,7 @@
 """Presets of the plant: which effects act, and their numbers; files of config/plant.
 
-    ground_effect: {strength: 1.0, fountain: 2.0}
-    downwash: on            as in laboratory.yaml
-    battery_sag: off
-    servo_noise: {torque: [0.022, 0.015], bandwidth: 5.0}      a number for each joint
-
-A parameter that a file does not give is that of laboratory.yaml, or of odometry.yaml.
+The form of a file: docs/plant.md. A parameter that it does not give is that of laboratory.yaml, or
+of odometry.yaml.
 """
 
 from collections.abc import Mapping, Sequence
