@@ -9,11 +9,10 @@ from typing import Any, TextIO
 class Output:
     """A text stream of this process whose lines may get lost: without a reader, or without room.
 
-    From the first error on its lines go nowhere; `lost` is its reason, "" for a reader that ended,
-    as in `uam fly | head`. Other members are the stream's.
+    From the first error on its lines go nowhere. Other members are the stream's.
     """
 
-    lost: str | None = None
+    lost: str | None = None  # reason of that error, "" for a reader that ended: `uam fly | head`
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

@@ -98,8 +98,7 @@ class Charts:
         joints: Sequence[str],
         hand: bool,
     ):
-        """window: shown time [s]; interval: between samples [s]; joints: their names; hand: whether
-        there is an end effector."""
+        """window: shown time [s]; interval: between samples [s]; hand: there is an end effector."""
         self._gui, self._times = gui, (window, interval)
         self._joints = len(joints)
         self._charts: list[StripChart] = []

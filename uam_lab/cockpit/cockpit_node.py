@@ -44,8 +44,7 @@ class FrameRate:
         machine: Callable[[], float] | None = None,
     ) -> None:
         """fastest, slowest: periods [s]; own: processor time of this process so far [s]; machine:
-        used share of all processor time since the last call, 0..1.
-        """
+        used share of all processor time since the last call, 0..1."""
         self._fastest, self._slowest, self._clock = fastest, slowest, clock
         self._own = own or (lambda: sum(psutil.Process().cpu_times()[:2]))  # of user and system
         self._machine = machine or (lambda: psutil.cpu_percent() / 100.0)

@@ -109,8 +109,7 @@ class Page:
         namespace: str = "/",
     ):
         """options: config/views/cockpit.yaml; plain: shows the same without the scene; todo:
-        clicks, processed by `look`; namespace: of the vehicle's nodes.
-        """
+        clicks, processed by `look`; namespace: of the vehicle's nodes."""
         self._server, self._options = server, options
         self._todo, self._plain = todo, plain
         self._answers_seen: int | None = None

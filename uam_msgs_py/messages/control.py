@@ -114,8 +114,7 @@ class PositionCommandWriter(CommandWriter):
         self, stamp: int, reference: np.ndarray, attitude: np.ndarray, tau: np.ndarray
     ) -> bytes:
         """Return the message; stamp [ns], reference (3, 6 + n), attitude (3, 3): rows q_d, Omega_d,
-        Omega_d_dot; tau (3,) [N, world].
-        """
+        Omega_d_dot; tau (3,) [N, world]."""
         for i, row in enumerate(ROWS):
             values = self.values[row]
             values[POSITION] = reference[i, POSITION]

@@ -29,10 +29,7 @@ LARGEST_DEVIATION = 0.25
 
 
 def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odometry:
-    """Return the state (3, 6 + n) at `stamp` [ns]: pose in the world, twist in the body (FLU).
-
-    frame: name of the body's frame.
-    """
+    """Return the state (3, 6 + n) at `stamp` [ns]: pose in the world, twist in the body (FLU)."""
     message = Odometry(child_frame_id=frame)
     message.header.frame_id = WORLD
     set_stamp(message.header.stamp, stamp)

@@ -55,15 +55,12 @@ class Refusals:
 
 
 class Door:
-    """The messages of a node's subscriptions.
-
-    `guards`: of subscriptions with a rightful publisher. The node announces `news` in /diagnostics
-    and its log.
-    """
+    """The messages of a node's subscriptions. The node announces `news` in /diagnostics and
+    its log."""
 
     def __init__(self, node: Node, tells: bool = False):
         """tells: a refusal is logged here, for a node without /diagnostics."""
-        self.guards: dict[Subscription, SolePublisher] = {}
+        self.guards: dict[Subscription, SolePublisher] = {}  # where there is a rightful publisher
         self.refusals = Refusals()
         self._node, self._tells = node, tells
         self._takers: dict[Subscription, Taker] = {}  # of the others
@@ -92,10 +89,7 @@ class Door:
         self._takers.pop(subscription, None)
 
     def taken(self, subscription: Subscription) -> Iterator[tuple[Any, dict[str, int]]]:
-        """Take and yield the received messages and their times, oldest first.
-
-        They are serialized if the subscription is raw.
-        """
+        """Take and yield the received messages (serialized if raw) and times, oldest first."""
         taker = self.taker(subscription)
         source = self.guards.get(subscription) or taker
         kind, raw = subscription.msg_type, subscription.raw

@@ -47,7 +47,6 @@ def ages(inputs: Iterable[str], arrivals: Mapping[str, float], namespace: str) -
     """Return the diagnostic values: age (wall time) of each input's newest valid message.
 
     arrivals: topic → time.monotonic() [s]; the age is "" for an input without a message.
-    namespace: of the node.
     """
     now = time.monotonic()
     return {

@@ -80,10 +80,7 @@ class StampJoin:
         depth: int = 32,
         ahead: Ahead | None = None,
     ):
-        """inputs: names, in the order of the values; depth: most incomplete stamps stored.
-
-        ahead: the input that is sent one tick ahead, if any.
-        """
+        """inputs: names, in the order of the values; depth: most incomplete stamps stored."""
         self._early = ahead
         self._ahead = None if ahead is None else list(inputs).index(ahead.name)
         self._index = {name: i for i, name in enumerate(inputs)}

@@ -59,15 +59,12 @@ rcutils.rcutils_uint8_array_fini.argtypes = [POINTER(_Bytes)]
 
 
 class Taker:
-    """Takes the messages of one subscription. `gid` and `info` are those of the last one.
-
-    `gid`: a view of the publisher's identity; compare it with bytes. `info`: times [ns] and
-    sequence numbers, as in rmw_message_info_t.
-    """
+    """Takes the messages of one subscription. `gid` and `info` are those of the last one. `gid` is
+    a view of the publisher's identity; compare it with bytes."""
 
     def __init__(self, subscription: Subscription):
         self._handle = subscription.handle  # keeps the pointer valid
-        self.info = _Info()
+        self.info = _Info()  # times [ns] and sequence numbers, as in rmw_message_info_t
         self.gid = memoryview(self.info).cast("B")[_Info.gid.offset :][:GID_SIZE]
         self._data = _Bytes(allocator=rcutils.rcutils_get_default_allocator())
         self._arguments = (

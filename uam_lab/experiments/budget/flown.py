@@ -111,10 +111,7 @@ class Budget:
 
 
 def fly(layout: str, settings: FlightSettings, observer: Observer, stop: StopRequest) -> Budget:
-    """Fly with measured ticks and return the budget. Raises NoTicks, and what a flight raises.
-
-    settings: with `tick_times`.
-    """
+    """Fly settings with `tick_times`; return a budget. Raises NoTicks and what a flight raises."""
     shares = CoreShares(observer)
     with Flight(checked=settings, observer=shares, stop=stop) as flight:
         result = flight.wait()

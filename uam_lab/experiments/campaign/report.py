@@ -202,8 +202,7 @@ def write(
 ) -> str:
     """Write campaign.json, campaign.png, summary.md and report.html; return summary.
 
-    results: by the flight's number; vehicle: its name; again: command that flies one flight again,
-    to which `--draws NUMBER --replay` is added.
+    again: command that flies one flight again, to which `--draws NUMBER --replay` is added.
     """
     flights = Flown(results)
     shared = common(flights.drawn, flights.failed)

@@ -51,10 +51,7 @@ def write(
     modular: tuple[str, Sequence[Table]],
     facts: Mapping[str, Any],
 ) -> tuple[str, Path]:
-    """Write comparison.json, tables.md, figures/ and report.html to `out`.
-
-    Returns a text for the console, and the page.
-    """
+    """Write comparison.json, tables.md, figures/ and report.html to `out`; return text and page."""
     found = tables.rows(results)
     modularity, modular_tables = modular
     claims = [*tables.claims(found), modularity]

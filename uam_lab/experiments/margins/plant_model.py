@@ -43,9 +43,8 @@ def plant_model(
     """Return the plant's block for one control period, and the operating point.
 
     payload_mass [kg], rigid on the magnet; arm (n,): joint angles [rad]; dry: whether the joints
-    have their dry friction. Inputs: motor.1 ... the
-    commands 0..1, and effort.<joint> [N m], sent at the tick; outputs: true.<coordinate> and
-    true.<coordinate>_dot at the tick, SI units.
+    have their dry friction. Inputs: motor.1 ... the commands 0..1, and effort.<joint> [N m], sent
+    at the tick; outputs: true.<coordinate> and true.<coordinate>_dot at the tick, SI units.
     """
     described, numbers = vehicle.description, vehicle.numbers
     names, period = described.coordinates, described.control_period

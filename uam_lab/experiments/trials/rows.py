@@ -88,10 +88,7 @@ class RowTableError(ValueError):
 
 class RowTable:
     """The rows in `file`. The first field of the schema is the key, a whole number or a text.
-
-    key: name of that field; keys: of the rows so far. Context manager whose end writes the last
-    rows.
-    """
+    A context manager whose end writes the last rows."""
 
     def __init__(self, file: Path, schema: pa.Schema, of: Mapping[str, str]) -> None:
         """of: name → digest of all inputs of the rows.
@@ -100,12 +97,12 @@ class RowTable:
         """
         self.file, self._parts = file, file.with_suffix(".parts")
         self._schema = schema.with_metadata({MARK: json.dumps(dict(of)).encode()})
-        self.key = schema.names[0]
+        self.key = schema.names[0]  # its name
         self._waiting: list[Mapping[str, Any]] = []
         self._written, self._number = time.monotonic(), 0
         if file.exists() or self._part_files():
             self.compact()
-        self.keys = set(self._read([self.key])[self.key].to_pylist())
+        self.keys = set(self._read([self.key])[self.key].to_pylist())  # of the rows so far
 
     def __enter__(self) -> Self:
         return self

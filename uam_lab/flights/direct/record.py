@@ -184,8 +184,7 @@ def record_step(arrays: tuple) -> int:
 
 @jit
 def keep(row: np.ndarray, time: float, motors: np.ndarray, magnet: float) -> None:
-    """Write time [s] and the commands in force, motors (rotors,) and magnet, to a row of the
-    ring."""
+    """Write time [s] and commands in force, motors (rotors,) and magnet, to a row of the ring."""
     row[TIME], row[MAGNET] = time, magnet
     for i in range(len(motors)):
         row[MOTORS + i] = motors[i]

@@ -48,8 +48,7 @@ class Starter(threading.Thread):
     """
 
     def __init__(self, guest: Callable[[str], Guest], checklist: bool) -> None:
-        """guest: returns a node in the flight's ROS domain, by its name; checklist: wait for the
-        lists."""
+        """guest: name → node in the flight's ROS domain; checklist: wait for the lists."""
         super().__init__(name="starter", daemon=True)
         self._guest, self._required = guest, checklist
         self._ended = threading.Event()
@@ -150,10 +149,7 @@ class RehearsalCourse(VehicleCourse):
         self._said, self._say_at = "", 0.0  # [s] time.monotonic()
 
     def start(self) -> None:
-        """Start laboratory and autopilot; where the devices are there, the nodes.
-
-        Raises NodeFailed.
-        """
+        """Start laboratory and autopilot; where devices are there, the nodes. Raises NodeFailed."""
         flight, children = self.flight, self.children
         devices = devices_of(flight.folder)
         children.start(LABORATORY, LABORATORY_MODULE, flight.ros_arguments, may_end=True)

@@ -160,10 +160,7 @@ def flight_nodes(settings: FlightSettings, folder: ResultFolder) -> dict[str, di
 def complete(
     sections: dict[str, dict[str, Any]], settings: FlightSettings, folder: ResultFolder
 ) -> dict[str, dict[str, Any]]:
-    """Return the sections with the parameters of nodes without a profile, and the vehicle.
-
-    And with those of the processes.
-    """
+    """Return the sections with parameters of nodes without a profile, of vehicle and processes."""
     if settings.fused:
         sections[wiring.FLIGHT_CONTROLLER] = {
             "without": ",".join(name for name in wiring.FUSED if name in settings.without)

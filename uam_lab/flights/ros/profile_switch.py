@@ -163,8 +163,7 @@ class ProfileSwitch:
 
 class _Call:
     """A request, repeated until a response arrives: during discovery a service may receive a
-    request before it can reach the client with the response. The requests are idempotent.
-    """
+    request before it can reach the client with the response. The requests are idempotent."""
 
     def __init__(self, client: Client, request: Any):
         self._client, self._request = client, request

@@ -244,10 +244,7 @@ class Course(ExitStack):
 
 
 def run(course: Course) -> NodeFailed | None:
-    """Start all processes of a flight, watch them while its course goes on, stop them.
-
-    Returns the failure, if any.
-    """
+    """Start all processes of a flight, watch them while its course goes on, stop them."""
     flight = course.flight
     observer, stop = flight.observer, flight.stop
     with Processes(flight.folder.path / "logs", flight.surroundings) as children:

@@ -39,10 +39,8 @@ STATE_ROWS = ("positions", "velocities", "accelerations")
 
 
 class References:
-    """References of the mission: stamps (m,) [ns] and rows (m, 3 size + 1), take-off stamp.
-
-    A row contains chi_d, chi_d_dot, chi_d_ddot and whether position and attitude are flown.
-    """
+    """References of the mission: stamps (m,) [ns]; rows (m, 3 size + 1), each with chi_d,
+    chi_d_dot, chi_d_ddot and whether position and attitude are flown."""
 
     def __init__(self, log: Log, size: int):
         """size: number of entries of chi."""
@@ -87,8 +85,7 @@ def read_flight(
     """Return the outcome of the flight of `scenario` recorded in `path`: what the log has of it.
 
     vehicle: of a log without the simulator's topics, None for the default one; latencies are of
-    such a log only. Raises UnreadableLog
-    if the file is no log or its flight did not start.
+    such a log only. Raises UnreadableLog if the file is no log or its flight did not start.
     """
     log = Log.read(path)
     statuses = log.statuses()

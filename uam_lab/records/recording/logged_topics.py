@@ -160,10 +160,7 @@ class Log:
         return stamps, np.array(log.published)[order]
 
     def blocks(self, topic: Topic) -> list[Block]:
-        """Return the decoded messages of a topic, decoded once; may be empty.
-
-        Raises UnreadableLog.
-        """
+        """Return the messages of a topic, decoded once; may be empty. Raises UnreadableLog."""
         made = self._blocks.get(topic)
         if made is None:
             made = self._blocks[topic] = self._decoded(topic)

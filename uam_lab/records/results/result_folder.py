@@ -265,10 +265,7 @@ def _usable(path: Path) -> None:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """Make a new directory `name` under `parent`; add a number if the name exists.
-
-    Raises ResultFolderError.
-    """
+    """Make a directory in `parent`; add a number if the name exists. Raises ResultFolderError."""
     try:
         parent.mkdir(parents=True, exist_ok=True)
         path, number = parent / name, 1

@@ -80,8 +80,7 @@ class PhaseRow:
 
 def phase_rows(metrics: Mapping[str, Any]) -> list[PhaseRow]:
     """Return one row per phase. position: root mean square of the distance to the reference, 3-D;
-    attitude, arm: of the norm of their errors; tilt, thrust: largest.
-    """
+    attitude, arm: of the norm of their errors; tilt, thrust: largest."""
     rows = []
     for one in metrics.get("phases") or []:
         attitude, arm = (_norm(one["rms"][key]) for key in ("attitude_deg", "arm_deg"))

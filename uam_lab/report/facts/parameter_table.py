@@ -121,8 +121,7 @@ def changes(info: Mapping[str, Any]) -> list[tuple[int, dict[str, Any]]]:
 
 
 def together(marks: Iterable[tuple[float, Any]], apart: float) -> list[tuple[float, list[Any]]]:
-    """Return (time [s], items) of marks in order, (time, item); those closer than `apart` [s] share
-    a time."""
+    """Return (time [s], items) of marks in order; those closer than `apart` [s] share a time."""
     groups: list[tuple[float, list[Any]]] = []
     for time, item in marks:
         if groups and time - groups[-1][0] < apart:

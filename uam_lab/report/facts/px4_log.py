@@ -29,20 +29,16 @@ class UnreadableUlog(UnreadableFlight):
 
 @dataclass(frozen=True)
 class Px4Log:
-    """Columns by our names, and how well the clocks agree. Where a station moves PX4's
-    origin, the values are from ours."""
+    """Columns by our names, and how well the clocks agree; a station moves PX4's origins."""
 
-    columns: Mapping[str, tuple[np.ndarray, np.ndarray]]  # (time [s], values)
+    columns: Mapping[str, tuple[np.ndarray, np.ndarray]]  # (time [s], values from our origin)
     offset: float  # mission time minus PX4's [s]
     correlation: float  # of the setpoints there, 0..1
     origins: Mapping[str, float] = field(default_factory=dict)  # ours minus PX4's [m], by column
 
 
 def read(file: Path, series: Series) -> Px4Log:
-    """Read the log of the flight in `series`.
-
-    Raises UnreadableUlog, ImportError without pyulog, OSError.
-    """
+    """Read the log of a flight. Raises UnreadableUlog, ImportError without pyulog, OSError."""
     from pyulog import ULog
     from pyulog.exceptions import ULogException
 
