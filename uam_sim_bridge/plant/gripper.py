@@ -46,22 +46,18 @@ def add_drive(spec: mujoco.MjSpec, numbers: dict) -> None:
 
 
 class Fingers:
-    """Views of the fingers in MuJoCo's data; all of them have no entry without a gripper.
-
-    `goal` (m,): of the opening [m]; `ends` (m, 3): closed, open [m], and its step in a control
-    period; `opening`, `force` (m,): measured [m, N].
-    """
+    """Views of the fingers in MuJoCo's data; all of them have no entry without a gripper."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, numbers: dict | None) -> None:
         """numbers: the `gripper` entry of the vehicle, None without."""
-        self.ends, self._numbers = np.zeros((0, 3)), numbers
+        self.ends, self._numbers = np.zeros((0, 3)), numbers  # closed, open, step in a period [m]
         self.goal = self.opening = self.force = np.zeros(0)
         if numbers is None:
             return
         drive, tendon = model.actuator(DRIVE).id, model.tendon(DRIVE).id
-        self.goal = data.ctrl[drive : drive + 1]
-        self.opening = data.ten_length[tendon : tendon + 1]
-        self.force = data.actuator_force[drive : drive + 1]
+        self.goal = data.ctrl[drive : drive + 1]  # [m] of the opening
+        self.opening = data.ten_length[tendon : tendon + 1]  # [m] measured
+        self.force = data.actuator_force[drive : drive + 1]  # [N] measured
         for name in FINGERS:
             data.joint(name).qpos = 0.5 * numbers["opening"][1]
         self.goal[0] = numbers["opening"][1]

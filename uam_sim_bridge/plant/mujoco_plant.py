@@ -41,10 +41,7 @@ STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's 
 
 
 class MujocoPlant(Plant):
-    """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/.
-
-    `arrays`: all that compiled functions use, `body`: the vehicle's; never replaced.
-    """
+    """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/."""
 
     HAS_EFFECTS = True
     tick, magnet_gain, gusty, imu_late, joints_late = (Number() for _ in range(5))
@@ -80,7 +77,7 @@ class MujocoPlant(Plant):
         air = numbers["air"]
         keep = np.exp(-self.period / air["gust_time"])
         self._gust = Noise(gusts, np.full(3, air["gust"] * np.sqrt(1.0 - keep**2)))
-        self.body = self._lay_out(payload_mass, start, keep)
+        self.body = self._lay_out(payload_mass, start, keep)  # never replaced, as `arrays`
         base = model.joint(BASE).dofadr[0]
         self._push = data.qfrc_applied[base : base + 6]
 

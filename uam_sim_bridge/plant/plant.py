@@ -146,24 +146,20 @@ class Disturbance:
 class Plant(ABC):
     """Vehicle, payload and surroundings. A class is made with the arguments of `MujocoPlant`.
 
-    `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
-    periods stepped, after those of an earlier simulation; `truth_row`: the places in the row of
-    `observe`. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the physics
-    are refused, faults of sensors and commands are accepted. `HAS_EFFECTS`: whether it simulates
-    the effects of a preset (`vehicle.numbers["effects"]`); if not, presets are refused. `senses`,
-    `acts`: whether this plant changes samples, and commands or physics, of the one in `physics`.
+    `senses`, `acts`: whether this plant changes samples, and commands or physics, of the one in
+    `physics`.
     """
 
-    DISTURBABLE = True
-    HAS_EFFECTS = False
+    DISTURBABLE = True  # implements `disturb`; else only faults of the physics are refused
+    HAS_EFFECTS = False  # of a preset: `vehicle.numbers["effects"]`; else presets are refused
     senses = acts = False
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self.vehicle = vehicle
-        self.period: float = vehicle.description.control_period
+        self.vehicle = vehicle  # as flown
+        self.period: float = vehicle.description.control_period  # [s]
         self.joints = len(vehicle.description.joints)
-        self.tick = 0
-        self.truth_row = TruthRow.of(vehicle.description)
+        self.tick = 0  # periods stepped, after those of an earlier simulation
+        self.truth_row = TruthRow.of(vehicle.description)  # places in the row of `observe`
 
     @property
     def physics(self) -> Plant:
