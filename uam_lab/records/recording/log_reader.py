@@ -17,7 +17,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
-from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
+from uam_control.mission.mission_output import ABORTED, LANDED, TOUCHDOWN, WAITING
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
@@ -311,6 +311,7 @@ def phases(
     """
     left = any(
         status.state in (State.HOLDING.value, State.RELEASED.value)
+        or status.phase == TOUCHDOWN
         or status.delay > 0.0
         or (status.state == State.LANDING.value and status.abort_reason)
         for _, status in statuses
