@@ -53,10 +53,8 @@ AT_REST = 1e-4  # [m/s] velocity of the reference in the first ticks of a take-o
 class Controller:
     """Base of the three controllers: errors of the whole vehicle, one law, its saturation.
 
-    `parameters`: in use; `adaptation` (len(names),): the law's published gains; `names`: their
-    names; `errors` (3, 6 + n): rows e, e_dot, chi_d_ddot of the last tick, see `tracking_errors`;
-    `saturated`: whether a limit changed the output of the last tick; `flying`: whether the law has
-    begun; `arrays`: all that compiled functions use, made anew with the parameters.
+    `errors` (3, 6 + n): rows e, e_dot, chi_d_ddot of the last tick, see `tracking_errors`;
+    `saturated`: whether a limit changed the last output; `flying`: whether the law has begun.
     """
 
     columns: slice
@@ -64,8 +62,8 @@ class Controller:
 
     def __init__(self, parameters: LawParameters) -> None:
         self.law, self.parameters = catalogue.law(parameters.law)(parameters), parameters
-        self.names = self.law.names
-        self.adaptation = self.law.adaptation[: len(self.names)]
+        self.names = self.law.names  # of the published gains
+        self.adaptation = self.law.adaptation[: len(self.names)]  # the published gains
         self.memory = record(WHOLE, REAL)
         self.errors = np.zeros((3, ALPHA))
         self._norms, axes = np.zeros(3), len(parameters.inertia)
@@ -90,7 +88,7 @@ class Controller:
         """Make `arrays`, and prepare the functions that use them."""
         self._own = tuple(self.errors[:, self.columns])
         of_all = self.law.arrays.tau, self.errors, self._own, self._norms, self._tau, self.memory
-        self.arrays = self._arrays(ControllerArrays(*of_all))
+        self.arrays = self._arrays(ControllerArrays(*of_all))  # all that compiled functions use
 
     def _arrays(self, of_all: ControllerArrays) -> tuple:
         """Return `arrays`; of_all: those of every controller."""
@@ -137,16 +135,13 @@ class Controller:
 
 
 class PositionController(Controller):
-    """tau_p, eq. (8), ct1, and the desired attitude, which points the thrust along tau_p.
-
-    `attitude_reference`: see `AttitudeReference.value`.
-    """
+    """tau_p, eq. (8), ct1, and the desired attitude, which points the thrust along tau_p."""
 
     columns = POSITION
 
     def __init__(self, parameters: PositionLimits) -> None:
         self._attitude = AttitudeReference()
-        self.attitude_reference = self._attitude.value
+        self.attitude_reference = self._attitude.value  # see `AttitudeReference`
         self._made = np.full(1, math.nan)  # thrust of the rotors, see `RotorLead`
         super().__init__(parameters)
 

@@ -25,8 +25,7 @@ class AttitudeReference:
     """Desired attitude: roll and pitch from tau_p, yaw from the mission.
 
     `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2]; the
-    last two rows are in the desired body frame (FLU). Columns: about X, Y, Z. `filter`, `lead`:
-    state of `attitude_reference_step`.
+    last two rows are in the desired body frame (FLU). Columns: about X, Y, Z.
     """
 
     def __init__(self) -> None:

@@ -96,7 +96,7 @@ class EstimatorParameters(BaseParameters):
 
 
 class EstimatorArrays(NamedTuple):
-    """State of a `StateEstimator`."""
+    """State of a `StateEstimator`, which never replaces them."""
 
     pose: FilterArrays
     memory: np.ndarray  # see `arrays_of`
@@ -119,8 +119,7 @@ class StateEstimator(Estimator):
 
     Pass the samples by `mocap`, `imu` and `joints` as they arrive. Poses and readings wait for the
     next IMU sample or `update`, and are then used in the order of their stamps. `update` returns
-    the state at the stamp of the newest IMU sample. `arrays`: the whole state; they are never
-    replaced.
+    the state at the stamp of the newest IMU sample.
     """
 
     kind = EstimatorParameters

@@ -46,8 +46,7 @@ PERIOD, CARRY_PERIOD = 0.02, 0.1  # [s] between two steps; away from every stand
 
 
 class GraspExecutive:
-    """Watches the grasps of one flight; `decisions`: all so far; `grasp`: newest state; `lifted`:
-    whether the payload follows the tool upwards, before that is a decision."""
+    """Watches the grasps; `lifted`: the payload follows the tool up, before that is a decision."""
 
     def __init__(
         self, windows: Sequence[GraspWindow], expected: float, parameters: GraspParameters
@@ -55,8 +54,8 @@ class GraspExecutive:
         """windows: see `grasp_windows`; expected [kg]: the scenario's payload."""
         self.parameters = parameters
         self.directive = Directive()
-        self.decisions: list[GraspDecision] = []
-        self.grasp, self.lifted = Grasp.NONE, False
+        self.decisions: list[GraspDecision] = []  # all so far
+        self.grasp, self.lifted = Grasp.NONE, False  # newest state
         self._windows, self._expected = list(windows), expected
         self._step, self._since = Step.IDLE, 0.0
         self._attempt = 0

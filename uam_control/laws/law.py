@@ -60,8 +60,7 @@ class Law:
     | `whole` | whether in flight `control.whole_body` computes all three subsystems at once |
 
     `names`: of the published gains, the first values of `adaptation`, a float64 array (len(names) +
-    memory + per_axis n,). `frozen`: the adapted gains do not change (parameter `adapt`). `arrays`:
-    made anew with the parameters.
+    memory + per_axis n,).
     """
 
     kind: type[LawParameters]
@@ -93,7 +92,7 @@ class Law:
     def set_parameters(self, parameters: LawParameters) -> None:
         """Use `parameters` (validated) from the next tick on; the adapted gains stay."""
         self.parameters = parameters
-        self.frozen = not parameters.adapt
+        self.frozen = not parameters.adapt  # the adapted gains do not change
         self.arrays = LawArrays(parameters.record(), self.adaptation, self._tau)
         own = self._tau
         inputs = LawInputs(own, own, own, np.zeros(3), False, False, 0.0)

@@ -47,11 +47,9 @@ class GuidanceArrays(NamedTuple):
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `retreat` and `descend`.
 
-    `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
-    (5, 6 + n): the same without attitude, with jerk and snap. `course`: what it does, by the table
-    of `course`. `trajectory`: the path by the scenario time; one that takes its place equals it
-    then. `scenario_time` [s]: time on the scenario, constant during a hold. `arrays`: what compiled
-    functions use, never replaced.
+    `motion` (5, 6 + n): `reference` without attitude, with jerk and snap. `trajectory`: the path by
+    the scenario time; one that takes its place equals it then. `scenario_time` [s]: time on the
+    scenario, constant during a hold. `arrays` are never replaced.
     """
 
     scenario_time = Number()
@@ -69,7 +67,7 @@ class Guidance:
         end [s]: scenario time at which the path ends.
         """
         self._end = end
-        self.reference = reference
+        self.reference = reference  # (3, 6 + n) of the last `write`, attitude by `flatness`
         self.motion = motion = empty_motion(reference.shape[1] - ALPHA)
         self.memory, self._drag = record(WHOLE, REAL), np.zeros(3)
         ahead = np.zeros((MOST, *motion.shape)), np.zeros(MOST)
@@ -83,7 +81,7 @@ class Guidance:
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: WayBack | None = None  # offset from the path, on the way back to it
         self._brake: Braking | Segment | None = None  # in place of the path, after a release
-        self.course = Course.PATH
+        self.course = Course.PATH  # what it does, by the table of `course`
         self._due = math.inf  # stamp [s] at which a course of limited time ends, see `Cue`
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight

@@ -36,14 +36,11 @@ SHORTEST = 1.0  # [s] of a change
 
 
 class Shift:
-    """Shift of the positions of a path, with its rates; constant after each change.
-
-    `value` (3,) [m]: the present one, read only.
-    """
+    """Shift of the positions of a path, with its rates; constant after each change."""
 
     def __init__(self) -> None:
         self._values = np.zeros((MOTION_ROWS, 3))
-        self.value = self._values[CHI]
+        self.value = self._values[CHI]  # (3,) [m] the present one, read only
         self._goal = np.zeros(3)
         self._aimed: np.ndarray | None = None  # the array of the last change
         self._beside = False  # whether the goal is not zero
@@ -105,10 +102,7 @@ class WithoutDescent:
 
 
 class PayloadWatch:
-    """The executive of a flight, stepped at its own period while the scenario is flown.
-
-    `due_from` [s]: scenario time from which on it is stepped; `shift`: of the path.
-    """
+    """The executive of a flight, stepped at its own period while the scenario is flown."""
 
     _stepped, _period, due_from = Number(), Number(), Number()
 
@@ -120,7 +114,7 @@ class PayloadWatch:
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
         self._guidance = guidance
         self.configure(parameters)
-        self.shift = Shift()
+        self.shift = Shift()  # of the path
         guidance.shift, guidance.clear = self.shift.add, self.clear
         self._stepped = -math.inf  # stamp [s]
         self._period = self.executive.period
@@ -155,7 +149,7 @@ class PayloadWatch:
         state (3, 6 + n). Returns the reason to end the mission, "" without one.
         """
         executive, guidance = self.executive, self._guidance
-        self.due_from = executive.due_from
+        self.due_from = executive.due_from  # [s] scenario time from which on it is stepped
         if not self._due(self.memory, stamp, guidance.scenario_time):
             return ""
         if not all(map(math.isfinite, state[CHI].tolist())):  # faster than numpy on eight numbers

@@ -31,11 +31,7 @@ class ChecklistReport:
 
 
 class PreArm:
-    """The report of one scenario.
-
-    `checklist`: its newest report, None without; `stands` [s]: delay of the setpoints that the
-    reference stands.
-    """
+    """The report of one scenario."""
 
     def __init__(
         self,
@@ -47,14 +43,14 @@ class PreArm:
         """require_checklist: no flight without its permission; vehicle: with whose limits the
         reference is compared, None: it is not compared; compared: from the origin, it was before.
         """
-        self.checklist: ChecklistReport | None = None
+        self.checklist: ChecklistReport | None = None  # its newest report
         self._required = require_checklist
         self._scenario, self._vehicle, self._compared = scenario, vehicle, compared
         self._stands: np.ndarray | None = None  # (4,) place and yaw of the line below
         self._place: tuple[PreflightCheck, ...] = ()
         self._reference: tuple[PreflightCheck, ...] = ()
         self._checked: MissionParameters | None = None  # with which the reference was compared
-        self.stands = math.inf
+        self.stands = math.inf  # [s] delay of the setpoints that the reference stands
 
     def check_reference(self, parameters: MissionParameters) -> None:
         """Compare the whole reference with the limits; the time grows with the flight's length."""

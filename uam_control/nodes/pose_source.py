@@ -15,14 +15,11 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 
 
 class PoseSource:
-    """Reads poses by the node's parameter `pose_source`.
-
-    `topic`: theirs; `odometry`: whether they are those of an odometry.
-    """
+    """Reads poses by the node's parameter `pose_source`."""
 
     def __init__(self, node: Node) -> None:
         chosen = NodeParameters(node, PoseSourceParameters, read_only=True).current.pose_source
-        self.odometry = chosen == ODOMETRY
+        self.odometry = chosen == ODOMETRY  # whether the poses are of an odometry
         self.topic = topics.ODOMETRY_IN if self.odometry else topics.MOCAP
         self._body = frame(node, topics.BODY)
         self._anchor, self._told = PoseAnchor(), 0

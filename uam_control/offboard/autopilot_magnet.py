@@ -48,22 +48,19 @@ class AutopilotMagnetParameters(ParameterSet):
 
 
 class AutopilotMagnet:
-    """Requests the desired state until the autopilot acknowledges it. Times [s] of the ticks.
-
-    `state`: acknowledged, None while unknown; `requests`: number of commands sent.
-    """
+    """Requests the desired state until the autopilot acknowledges it. Times [s] of the ticks."""
 
     def __init__(self, parameters: AutopilotMagnetParameters) -> None:
         self._parameters = parameters
         gripper = parameters.magnet == GRIPPER
         self._command = MavCmd.DO_GRIPPER if gripper else MavCmd.DO_SET_ACTUATOR
-        self.requests = 0
+        self.requests = 0  # number of commands sent
         self._desired = False
         self.restart()
 
     def restart(self) -> None:
         """Forget what was acknowledged: the autopilot is new or has rebooted."""
-        self.state: bool | None = None
+        self.state: bool | None = None  # acknowledged, None while unknown
         self._due = -math.inf
         self._refusal = ""
         # A COMMAND_ACK has no number. Answers to requests of an earlier state may still come, at

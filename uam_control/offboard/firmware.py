@@ -23,10 +23,8 @@ KEYS = {"label", "autopilot", "integers_as_bytes", "modes", "loss_time", "record
 class Firmware:
     """How one firmware speaks.
 
-    `label`: its name in texts; `autopilot`: MAV_AUTOPILOT; `integers_as_bytes`: of PARAM_VALUE;
     `loss_time`: parameter with the time [s] without setpoints until its failsafe, "" for none;
-    `mapped`: parameter → (field of `RateThrustParameters`, axis or None); `watched`: all that the
-    bridge reads; `advice_by_pattern`: of a text, the first pattern that matches counts.
+    `mapped`: parameter → (field of `RateThrustParameters`, axis or None).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,8 +36,8 @@ class Firmware:
             raise ConfigurationError(
                 f"{file}: label, autopilot and modes are needed; allowed: {', '.join(sorted(KEYS))}"
             )
-        self.label, self.autopilot = str(table["label"]), int(table["autopilot"])
-        self.integers_as_bytes = bool(table.get("integers_as_bytes", False))
+        self.label, self.autopilot = str(table["label"]), int(table["autopilot"])  # MAV_AUTOPILOT
+        self.integers_as_bytes = bool(table.get("integers_as_bytes", False))  # of PARAM_VALUE
         self.loss_time = table.get("loss_time", "")
         self._modes = _modes(file, table["modes"])
         self._named = {number: mode for mode, number in self._modes.items()}
@@ -49,8 +47,8 @@ class Firmware:
             for axis, name in enumerate(names):
                 self.mapped[name] = field, axis if len(names) > 1 else None
         others = filter(None, (*table.get("recorded", ()), self.loss_time))
-        self.watched = tuple(dict.fromkeys((*self.mapped, *others)))
-        self.advice_by_pattern: dict[str, str] = self.table("advice")
+        self.watched = tuple(dict.fromkeys((*self.mapped, *others)))  # all that the bridge reads
+        self.advice_by_pattern: dict[str, str] = self.table("advice")  # the first match counts
         self._passing = {
             when: re.compile("|".join(patterns), re.IGNORECASE)
             for when, patterns in self.table("passing").items()

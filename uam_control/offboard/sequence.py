@@ -66,10 +66,9 @@ _KEPT_WITHOUT_LINK = (Phase.FLYING, Phase.RELEASED, Phase.FAILED, Phase.DISARMIN
 class OffboardSequence:
     """The state machine.
 
-    `phase`; `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when
-    the autopilot must run its own failsafe; OFFBOARD is then requested no more. `failure`: why the
-    sequence has given up, else ""; `stopped`: the motors must stay still until the next flight;
-    `commands`: each request as command and first parameters, in the words of `firmware`.
+    `released_to`: who has control in RELEASED, else ""; `failure`: why the sequence has given up,
+    else "". `let_go`: set by the owner when the autopilot must run its own failsafe; OFFBOARD is
+    then requested no more. `stopped`: the motors must stay still until the next flight.
     """
 
     _streamed, _time = Number(), Number()
@@ -77,7 +76,7 @@ class OffboardSequence:
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
         self.parameters = (parameters or OffboardParameters()).validated()
         self.firmware = firmware(self.parameters.firmware)
-        self.commands = commands_of(self.firmware)
+        self.commands = commands_of(self.firmware)  # request → command and first parameters
         self.phase = Phase.WAITING
         self._reasons = Reasons(self.firmware)
         self.released_to = self.failure = ""

@@ -207,10 +207,8 @@ def use_factor(memory: np.ndarray, flat: np.ndarray, factor: float) -> None:
 class RateThrustMap:
     """`rate_thrust_map` with its parameters; one instance per flight.
 
-    `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `flat`: see
-    `RateThrustParameters.flat`; never replaced. `thrust_factor`: true
-    thrust / thrust of the parameters' curve, 1 at first. `curve`: the numbers of that curve, as
-    `thrust_of_command` takes them; `gravity` [m/s^2]: of the vehicle.
+    `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `thrust_factor`: true
+    thrust / thrust of the parameters' curve, 1 at first.
     """
 
     _factor = Number()
@@ -222,12 +220,12 @@ class RateThrustMap:
     ) -> None:
         """parameters: None for those of the vehicle; vehicle: None for the default one."""
         self.rates = np.zeros(3)
-        self.flat = np.zeros(_LENGTH)
+        self.flat = np.zeros(_LENGTH)  # see `RateThrustParameters.flat`; never replaced
         # battery: full thrust now / full thrust with a full battery, by the parameters
         self.memory = record("", "factor battery")
         self._factor = 1.0
         self._vehicle = vehicle or load_description()
-        self.gravity = self._vehicle.gravity
+        self.gravity = self._vehicle.gravity  # [m/s^2]
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
         three = self.rates
         self._map = prepared(rate_thrust_map, three, three, three, three, self.flat, three)
@@ -236,7 +234,7 @@ class RateThrustMap:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         checked = parameters.validated()
         self.flat[:] = p = checked.flat(self._vehicle)
-        self.curve = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())
+        self.curve = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())  # for `thrust_of_command`
         self.parameters = checked
         self._torque_scale = checked.torque_scale(self._vehicle)
         self.memory["battery"] = checked.battery_factor

@@ -70,10 +70,7 @@ def silent(text: str, key: str | None) -> None:
 
 
 class SetpointSource:
-    """Makes the setpoint of a tick from commands, or from the latest state without commands.
-
-    `refused`: why the setpoint of the newest commands was not sent, "" for a good one.
-    """
+    """Makes the setpoint of a tick from commands, or from the latest state without commands."""
 
     def __init__(
         self,
@@ -91,7 +88,7 @@ class SetpointSource:
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
-        self.refused = ""
+        self.refused = ""  # why the setpoint of the newest commands was not sent, "" for a good one
         self._estimated = -math.inf  # stamp [s] of the estimate
         self.seen = np.array([-math.inf, *(math.nan,) * 4])  # stamp [s] and quaternion of a pose
         self._motion = np.full((3, ALPHA), math.nan)  # estimate

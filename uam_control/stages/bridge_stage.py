@@ -103,9 +103,7 @@ class BridgeStage:
     `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
     they are returned, and the autopilot gets none of them.
     `sent` (4,): body rates [rad/s, FLU] and thrust of the last setpoint, see `sent`;
-    `factor`: thrust factor used for it; `lift_due`: whether factor and `lift` are reported;
-    `report`: the report of the autopilot due after the last tick, None if none is due;
-    `last` [ns]: stamp of the last tick; `kept`: its setpoint; `lift`: see `FlightMeasurements`.
+    `lift_due`: whether factor and `lift` are reported; `kept`: the setpoint of the last tick.
     """
 
     factor, lift_due, last, _compiled = Number(), Flag(), Number(), Flag()
@@ -135,11 +133,11 @@ class BridgeStage:
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
         self._situation = Situation(armed=False, landed=True, let_go=False)
-        self.report: AutopilotReport | None = None
+        self.report: AutopilotReport | None = None  # of the autopilot, due after the last tick
         self.hands = False
         # last [ns]: stamp of the last tick; compiled: whether compiled ticks were the last ones
         self.memory, self.sent = record("last lift_due compiled", "factor"), np.zeros(4)
-        self.factor = 1.0
+        self.factor = 1.0  # thrust factor used for `sent`
         self._note_sent(None)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:

@@ -33,10 +33,8 @@ class MissionStage:
     Between `begin` and `advance`, `output` is the mission's output at this tick, see
     `MissionOutput`, `flying` is whether the controllers fly its reference, `reference`
     (3, 6 + n) what they fly, see `ahead`, and `time` the mission time [s]. `ahead` [ns]: the stamp
-    of the newest reference; `anew`: whether the reference of this tick was computed in it.
-
-    While the mission only follows its scenario, compiled functions do the same: `begin_tick` and
-    `advance` of this module, on `arrays`.
+    of the newest reference. While the mission only follows its scenario, compiled functions do the
+    same: `begin_tick` and `advance` of this module, on `arrays`.
     """
 
     time, ahead, period = Number(), Number(), Number()
@@ -76,7 +74,7 @@ class MissionStage:
         self._readings = self.inputs.tick(stamp)
         last, self._last = self._last, stamp
         serving = stamp == self.ahead or serves(self.ahead, last, stamp, self.period)
-        self.anew = not serving
+        self.anew = not serving  # whether the reference of this tick was computed in it
         if self.anew:
             self.advance(stamp - self.period, state)
         output, step = self.output, stamp - self.ahead

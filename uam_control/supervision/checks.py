@@ -159,23 +159,18 @@ class CheckArrays(NamedTuple):
 
 
 class Checks:
-    """The monitors of all quantities.
-
-    `setpoint_delay` [s]: of the last tick, NaN if unknown; `finding`: the worst exceeded limit,
-    None without one; `quiet`: no value is beyond a limit, not even for a short time. `arrays`: what
-    compiled functions use; `configure` replaces them.
-    """
+    """The monitors of all quantities; `arrays`: what compiled functions use, see `configure`."""
 
     setpoint_delay = Number()
 
     def __init__(self, parameters: SupervisionParameters) -> None:
         self._monitors = [Monitor() for _ in CHECKS]
-        self.quiet = True
+        self.quiet = True  # no value is beyond a limit, not even for a short time
         self._values = np.zeros(len(CHECKS))
         self._still = still_joints(len(parameters.joint_angle_hold))
-        self.finding: ExceededLimit | None = None
+        self.finding: ExceededLimit | None = None  # the worst one
         self.memory = record("", "setpoint_delay delay_nominal share")
-        self.setpoint_delay = math.nan
+        self.setpoint_delay = math.nan  # [s] of the last tick, NaN if unknown
         self._stands = math.inf
         self.configure(parameters)
 

@@ -24,13 +24,12 @@ class Monitor:
 
     The level rises when the value has exceeded the limit of a higher level for the time `after`,
     without being clear in between. It falls when the value has been clear for `clear_after`. Clear
-    means: within the limit by at least the hysteresis. `level`: current one; `value`: last one;
-    `largest`: the largest value since the limit of the current level was exceeded.
+    means: within the limit by at least the hysteresis.
     """
 
     def __init__(self) -> None:
-        self.level = Level.FINE
-        self.value = -math.inf
+        self.level = Level.FINE  # current one
+        self.value = -math.inf  # last one
         self._largest = [-math.inf] * len(REACTIONS)
         self._since: list[float | None] = [None] * len(REACTIONS)
         self._clear_since: float | None = None

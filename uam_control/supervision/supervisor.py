@@ -47,19 +47,16 @@ NOT_FOLLOWED = "no lift-off: the autopilot is silent, or lands by itself"
 
 
 class Supervisor:
-    """The state machine of `states.TRANSITIONS`; its only time is the stamps of the inputs.
-
-    `state`, `cause`, `decision`, `checks`: after the last step; `changes`: all transitions so far.
-    """
+    """The state machine of `states.TRANSITIONS`; its only time is the stamps of the inputs."""
 
     _stamp = Number()
 
     def __init__(self, parameters: SupervisionParameters) -> None:
         # left_behind: stamp [s] from which the reference climbs without the vehicle
         self.memory = record("", "stamp left_behind airborne_height liftoff_timeout")
-        self.state = State.GROUNDED
+        self.state = State.GROUNDED  # as cause, decision and checks: after the last step
         self.cause = "waiting for the start"
-        self.changes: list[StateTransition] = []
+        self.changes: list[StateTransition] = []  # all so far
         self._arm = False
         self._regains = 0  # commands to regain a released vehicle
         self._regained = -math.inf  # stamp [s] of the newest one that still counts

@@ -51,9 +51,7 @@ class Segment:
 class WayBack:
     """Offset from the path that decays to zero, with no step in value, rate or acceleration.
 
-    From rest the jerk has no step either.
-
-    `end` [s]: stamp at which it is zero. PEAK, HARDEST: from rest, largest rate and acceleration,
+    From rest the jerk has no step either. PEAK, HARDEST: from rest, largest rate and acceleration,
     times length / way and length^2 / way.
     """
 
@@ -71,7 +69,7 @@ class WayBack:
         )
         rows = np.zeros((SNAP, 2, offset.shape[1]))
         rows[:JERK, 0] = offset[:JERK]  # a jerk at the start would grow with the cube of the length
-        self._stamp, self.end = stamp, stamp + length
+        self._stamp, self.end = stamp, stamp + length  # [s] end: at which it is zero
         self._curve = hermite(np.array([0.0, length]), rows)
 
     def write(self, stamp: float, motion: np.ndarray) -> None:
