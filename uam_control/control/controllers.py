@@ -71,10 +71,7 @@ class Controller:
         self.set_parameters(parameters)
 
     def set_parameters(self, parameters: LawParameters) -> None:
-        """Use `parameters` (validated) from the next tick on; the adapted gains stay.
-
-        Raises ParameterError if they are the parameters of another law.
-        """
+        """See `Law.set_parameters`. Raises ParameterError for the parameters of another law."""
         flying = self.law.parameters.law
         if parameters.law != flying:
             raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")

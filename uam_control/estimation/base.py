@@ -61,10 +61,7 @@ class Estimator:
         raise NotImplementedError
 
     def update(self) -> np.ndarray:
-        """Return the state (3, 6 + n) at the newest IMU stamp, see `coordinates`.
-
-        The same array at each call, overwritten.
-        """
+        """Return state (3, 6 + n) at the newest IMU stamp, see `coordinates`; overwritten later."""
         raise NotImplementedError
 
     @property

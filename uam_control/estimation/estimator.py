@@ -227,10 +227,7 @@ def forget_samples(a: EstimatorArrays) -> None:
 def take_mocap(
     a: EstimatorArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray
 ) -> None:
-    """Process a pose exposed at `stamp` [s].
-
-    position (3,) [m, world]; quaternion (4,) body → world [w x y z].
-    """
+    """See `Estimator.mocap`; the quaternion turns body → world."""
     m = a.numbers[0]
     if not a.pose.numbers[0].count and not (m.started and stamp < m.start):
         motion, _, _ = parts_of(a.pose.memory)
@@ -244,10 +241,7 @@ def take_mocap(
 def take_imu(
     a: EstimatorArrays, stamp: float, gyro: np.ndarray, specific_force: np.ndarray
 ) -> None:
-    """Process an IMU sample at `stamp` [s].
-
-    gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
-    """
+    """Take an IMU sample of `stamp` [s]: gyro (3,) [rad/s], specific_force (3,) [m/s^2], FLU."""
     follow_waiting(a)
     m = a.numbers[0]
     first, step = math.isnan(m.imu_stamp), stamp - m.imu_stamp

@@ -66,7 +66,6 @@ def asmc1_step(
 ) -> None:
     """Compute one tick of ASMC-1: write tau (n,) and advance adaptation (n + 1,) in place.
 
-    inputs: see `LawInputs`; record: of `LawParameters.record`.
     The derivative of Dhat does not contain Dhat: the sum is exact for s constant over the tick.
     """
     p = record[0]

@@ -136,7 +136,6 @@ def law_step(
 ) -> None:
     """Compute one tick of the law: write tau (n,) and advance adaptation (8 + n,) in place.
 
-    inputs: see `LawInputs`; record: of `LawParameters.record`.
     Equations (7), (8), (12), (13) for the position; (17), (18), (21), (22) for the attitude;
     (24), (25), (28), (29) for the arm.
     """

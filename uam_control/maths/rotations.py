@@ -184,8 +184,5 @@ wrapped = jit(wrap_angle)  # the same for compiled functions
 
 @borrowing
 def tilt(euler: np.ndarray) -> float:
-    """Return the angle [rad] between the vertical axes of body and world.
-
-    euler: (3,) roll, pitch, yaw [rad].
-    """
+    """Return the angle [rad] between body z and world z; euler (3,): roll, pitch, yaw [rad]."""
     return math.acos(math.cos(euler[0]) * math.cos(euler[1]))

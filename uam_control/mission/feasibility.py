@@ -175,8 +175,7 @@ class Feasibility:
 
     def _near_ground(self, demand: Demand, ground: float) -> tuple[np.ndarray, np.ndarray]:
         """Return heights (m,) [m] of a vehicle that moves across, and sink rates (m,) [m/s] of one
-        that comes straight down; infinite at all other times.
-        """
+        that comes straight down; infinite at all other times."""
         height = demand.position[:, Z] - ground
         velocity = np.gradient(demand.position, demand.times, axis=0)
         across = np.hypot(velocity[:, X], velocity[:, Y]) > CRAWL

@@ -64,8 +64,7 @@ class Guidance:
         end: float = 0.0,
     ) -> None:
         """stamp [s]: of the take-off; reference: array to write; stowed: landing angles [rad];
-        end [s]: scenario time at which the path ends.
-        """
+        end [s]: scenario time at which the path ends."""
         self._end = end
         self.reference = reference  # (3, 6 + n) of the last `write`, attitude by `flatness`
         self.motion = motion = empty_motion(reference.shape[1] - ALPHA)

@@ -79,10 +79,7 @@ def read_hand_trajectory(data: bytes, flyer: Flyer | None) -> HandPoints:
 
 
 def read_hand_twist(data: bytes, flyer: Flyer | None, tool: str) -> HandTwist:
-    """Return the jog of a serialized TwistStamped; raises BadMessage.
-
-    tool: frame of the end effector.
-    """
+    """Return the jog of a serialized TwistStamped; raises BadMessage. tool: the hand's frame."""
     message = deserialized(data, TwistStamped)
     frame = message.header.frame_id
     if frame != tool:

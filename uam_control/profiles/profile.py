@@ -131,10 +131,7 @@ class Profile:
         )
 
     def changed(self, name: str, changes: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the profile `name` with other parameters, node → parameter → value.
-
-        Raises ProfileError.
-        """
+        """Return it as `name` with other parameters, node → name → value; raises ProfileError."""
         own = {node: self.section(node) | values for node, values in changes.items()}
         return profile_of(self.sections | own, Path(f"{name}.yaml"), self.vehicle)
 

@@ -162,10 +162,7 @@ def advance(
     state: DelaySums,
     numbers: DelayNumbers,
 ) -> None:
-    """Advance the filters by a tick, and the sums if it counts.
-
-    setpoint, rates (3,) [rad/s].
-    """
+    """Advance the filters by a tick, and the sums if it counts; setpoint, rates (3,) [rad/s]."""
     now, filters, past, sums, total = state
     period, forget, newest = numbers.period, numbers.forget, int(now[NEWEST])
     count = past.shape[1]

@@ -257,8 +257,7 @@ class RateThrustMap:
     ) -> tuple[np.ndarray, float]:
         """Return the body-rate setpoint (3,) [rad/s, FLU] and the normalised thrust 0..1.
 
-        tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in
-        ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
+        float64 arrays as in `rate_thrust_map`. Raises SetpointRefused if one is not finite.
         """
         thrust = self._map(tau_p, tau_q, attitude, body_rates, self.flat, self.rates)
         if thrust < 0.0:

@@ -18,10 +18,7 @@ class ConfigurationError(ValueError):
 
 @cache
 def root() -> Path:
-    """Return the directory that contains profiles/, scenarios/, vehicle/ ...
-
-    Raises ConfigurationError if the installation has none.
-    """
+    """Return the directory of profiles/, scenarios/ ...; raises ConfigurationError without one."""
     package = Path(__file__).resolve().parents[1]
     checkout = package.parent
     if (checkout / "pyproject.toml").is_file() and (checkout / "config").is_dir():

@@ -27,8 +27,7 @@ class _NotPlain(yaml.constructor.ConstructorError):
 
 class _Strict:
     """Part of a loader: refuses a key given twice, of which YAML's readers keep the last, and
-    numbers like 1:30 (90) and 010 (8).
-    """
+    numbers like 1:30 (90) and 010 (8)."""
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
         """Return a decimal or hexadecimal whole number of 64 bits, as ROS has them."""

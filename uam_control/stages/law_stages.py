@@ -74,10 +74,7 @@ class MeasuredDelay:
 def apply_reports(
     delay: np.ndarray, reports: np.ndarray, prediction: np.ndarray, stamp: int
 ) -> None:
-    """Use the newest report that has arrived at the tick `stamp` [ns].
-
-    The first three: `MeasuredDelay.arrays`.
-    """
+    """Use the newest report that has come by `stamp` [ns]; first three: `MeasuredDelay.arrays`."""
     m, used = delay[0], 0
     while used < m.count and reports[used].stamp <= stamp - REPORT_DELAY:
         predict_by(prediction, reports[used].loop_delay)
@@ -106,10 +103,7 @@ class LawStage:
         self.begin = partial(prepared(step_to, self.memory, 0), self.memory)
 
     def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
-        """Return tau of the controller at the tick `stamp` [ns].
-
-        inputs: those of the controller's `update`, without dt: see `step_to`.
-        """
+        """Return tau at tick `stamp` [ns]; inputs: of the controller's `update`; dt: `step_to`."""
         return self.controller.update(*inputs, self.begin(stamp))
 
 

@@ -120,11 +120,7 @@ class Inputs:
     def autopilot(
         self, stamp: float, round_trip: float = math.nan, loop_delay: float = math.nan
     ) -> None:
-        """Store that the bridge was connected to the autopilot at `stamp` [s].
-
-        round_trip [s]: of the link; loop_delay [s]: from a setpoint to the gyro's response; NaN if
-        unknown.
-        """
+        """Store a connection to the autopilot at `stamp` [s]; delays: see `Readings`, or NaN."""
         self._autopilot = stamp
         self._readings.round_trip, self._readings.loop_delay = round_trip, loop_delay
 

@@ -294,10 +294,7 @@ def merged(servos: list[Section]) -> dict[str, Any]:
 
 
 def check_plant_numbers(top: Section, servos: list[Section]) -> None:
-    """Raise the section's error if an entry that only plant or drivers read is not usable.
-
-    servos: those of each joint.
-    """
+    """Raise the section's error for a bad entry of plant or drivers only; servos: of each joint."""
     air = top.section("air")
     if min(drag := air.numbers("drag", 3)) < 0.0:
         raise air.error("drag", f"{min(drag):g} N s/m is below 0")

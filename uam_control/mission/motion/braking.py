@@ -109,10 +109,7 @@ class Braking:
 
 
 def leaves_geofence(stamp: float, state: np.ndarray, p: MissionParameters, ground: float) -> str:
-    """Say by how much a vehicle that brakes from `stamp` [s] on would leave the geofence, or "".
-
-    state (3, 6 + n), ground [m]: see `Braking`.
-    """
+    """Say by how much a vehicle that brakes, see `Braking`, would leave the geofence, or ""."""
     places = Braking(stamp, state, p, ground).places()
     low, high = np.array(p.geofence_low), np.array(p.geofence_high)
     beyond = np.maximum(low - places, places - high).max(axis=0)

@@ -89,10 +89,7 @@ class PathClock:
         return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
 
     def change(self, stamp: float, goal: float, length: float) -> None:
-        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s] on.
-
-        No effect if it changes to `goal` already.
-        """
+        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s], unless it does so."""
         if self._ramp is not None and goal == self.goal:
             return
         self._ramp = (stamp, length, *self.at(stamp)[:3], goal)

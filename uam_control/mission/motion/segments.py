@@ -24,8 +24,7 @@ class Segment:
         columns: slice = slice(None),
     ) -> None:
         """Begin at `stamp` [s] at start (3, 6 + n) or (5, 6 + n); end at goal (6 + n,), after
-        lengths (6 + n,) [s]; columns: those that move.
-        """
+        lengths (6 + n,) [s]; columns: those that move."""
         self._stamp, self._columns = stamp, columns
         self._lengths, self._goal = lengths[columns], goal[columns].copy()
         start = start[:, columns]

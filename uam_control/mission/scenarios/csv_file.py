@@ -61,10 +61,7 @@ FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
 
 
 def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) -> Scenario:
-    """Read a trajectory; take-off, transit, return and landing are added, see `route`.
-
-    Raises ScenarioError with line and column.
-    """
+    """Read a trajectory, completed as in `route`; raises ScenarioError with line and column."""
     table = _Table(file, len(vehicle.joints))
     times = table.times - table.times[0]
     notes: list[str] = []

@@ -51,10 +51,7 @@ def rise(height: float) -> tuple[Harmonic, ...]:
 def derivatives(
     harmonics: tuple[Harmonic, ...], theta: np.ndarray, count: int, size: int
 ) -> np.ndarray:
-    """Return the sum of the harmonics and its derivatives in theta, (count, m, size).
-
-    theta (m,) [rad]; size: number of coordinates.
-    """
+    """Return the sum of the harmonics and its derivatives in theta (m,) [rad]: (count, m, size)."""
     found = np.zeros((count, len(theta), size))
     for h in harmonics:
         for k in range(count):

@@ -191,10 +191,7 @@ class Swing(NamedTuple):
 
 
 def worst_swing(times: np.ndarray, samples: CurveSamples, curve: Polynomials) -> Swing | None:
-    """Return the swing that exceeds its bound most, None if no gap has one.
-
-    times (m,) [s] of the samples; curve: their fit.
-    """
+    """Return the swing of the fit that exceeds its bound most, if a gap has one; times (m,) [s]."""
     gaps = np.flatnonzero(np.diff(times) > COARSEST)
     if not len(gaps):
         return None

@@ -129,10 +129,7 @@ class HandSource:
 
 
 def hand_source(entry: Section, vehicle: VehicleDescription, folder: Path) -> HandSource:
-    """Return the task of an entry of the kind `end_effector`; raise ScenarioError.
-
-    folder: of a CSV file that is named in it.
-    """
+    """Return the task of an `end_effector` entry; folder: of its CSV file; raise ScenarioError."""
     if "at" in entry.values:
         raise entry.error("at", f"not with the kind {KIND}")
     shape = entry.one_of("shape", (*SHAPES, HOLD, CSV))

@@ -93,20 +93,14 @@ def _inside(path: Polynomials, count: int) -> np.ndarray:
 
 
 def _force_and_tilt(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the force per mass (m,) [m/s^2] and the tilt (m,) [rad] that rows (m, 5, 6 + n) need.
-
-    Without drag.
-    """
+    """Return force per mass (m,) [m/s^2], tilt (m,) [rad] of rows (m, 5, 6 + n), without drag."""
     push = rows[:, CHI_DDOT, POSITION] + (0.0, 0.0, GRAVITY)
     force = np.linalg.norm(push, axis=1)
     return force, np.arccos(np.clip(push[:, Z] / np.maximum(force, 1e-9), -1.0, 1.0))
 
 
 def _sizes(rows: np.ndarray) -> np.ndarray:
-    """Return norms of the position's rows, and the largest of yaw and joints: (m, 2, 5).
-
-    rows (m, 5, 6 + n).
-    """
+    """Return (m, 2, 5) of rows (m, 5, 6 + n): norms of the position, largest of yaw and joints."""
     ways = np.linalg.norm(rows[:, :, POSITION], axis=2)
     return np.stack([ways, np.abs(rows[:, :, YAW:]).max(axis=2)], axis=1)
 
