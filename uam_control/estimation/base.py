@@ -21,17 +21,12 @@ class BaseParameters(ParameterSet):
 
 
 class Estimator:
-    """Takes samples in the order of their arrival, stamps in [s]; listed in `catalogue.ESTIMATORS`.
+    """Takes samples in order of arrival, stamps in [s]; listed in `catalogue.ESTIMATORS`."""
 
-    `kind`: class of its parameters; the default of their `estimator` is its name. `complete`:
-    whether every input has delivered a sample. `bias_known`: whether `imu_bias` may be judged.
-    `refused_poses`: number of poses that were not believed.
-    """
-
-    kind: type[BaseParameters]
-    complete: bool
-    bias_known = False
-    refused_poses = 0
+    kind: type[BaseParameters]  # of its parameters; the default of their `estimator` is its name
+    complete: bool  # whether every input has delivered a sample
+    bias_known = False  # whether `imu_bias` may be judged
+    refused_poses = 0  # number of poses that were not believed
 
     def __init__(self, parameters: BaseParameters, joints: int) -> None:
         """joints: how many the arm has."""

@@ -48,28 +48,18 @@ class LawArrays(NamedTuple):
 class Law:
     """The law of one subsystem and its adapted gains.
 
-    A law is a subclass with these attributes and `gain_groups`, listed in `catalogue.LAWS`:
-
-    | attribute | meaning |
-    |---|---|
-    | `kind` | class of its parameters; the default of their `law` is the name of the law |
-    | `label` | its name in tables and figures |
-    | `profile` | its profile in config/profiles; "": see `default_profile` |
-    | `memory`, `per_axis` | values in `adaptation` after the published gains: in all, per axis |
-    | `step` | the compiled function of one tick: step(record, inputs, adaptation, tau) |
-    | `whole` | whether in flight `control.whole_body` computes all three subsystems at once |
-
+    A law is a subclass with the attributes below and `gain_groups`, listed in `catalogue.LAWS`.
     `names`: of the published gains, the first values of `adaptation`, a float64 array (len(names) +
     memory + per_axis n,).
     """
 
-    kind: type[LawParameters]
-    label: str
-    profile: str = ""
-    memory: int = 0
-    per_axis: int = 0
-    whole: bool = False
-    step: Callable
+    kind: type[LawParameters]  # the default of their `law` is the name of the law
+    label: str  # its name in tables and figures
+    profile: str = ""  # its profile in config/profiles; "": see `default_profile`
+    memory: int = 0  # values in `adaptation` after the published gains, in all
+    per_axis: int = 0  # such values per axis
+    whole: bool = False  # in flight `control.whole_body` computes all three subsystems
+    step: Callable  # the compiled function of one tick: step(record, inputs, adaptation, tau)
 
     def __init__(self, parameters: LawParameters) -> None:
         axes, self.parameters = len(parameters.inertia), parameters

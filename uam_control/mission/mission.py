@@ -42,8 +42,7 @@ class MissionArrays(NamedTuple):
 class Mission(FlightSequence):
     """A sequence that takes commands: each is refused with a reason, or the next step does it.
 
-    While it only follows its scenario, compiled functions step it; `arrays`: what they use, None
-    before a flight.
+    While it only follows its scenario, compiled functions step it.
     """
 
     def start(self) -> tuple[bool, str]:
@@ -168,7 +167,7 @@ class Mission(FlightSequence):
 
     def _begin(self, parameters: MissionParameters) -> None:
         super()._begin(parameters)
-        self.arrays: MissionArrays | None = None
+        self.arrays: MissionArrays | None = None  # None before a flight
 
     def _arrange(self) -> None:
         """Collect the arrays of a flight."""

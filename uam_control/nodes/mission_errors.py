@@ -24,16 +24,12 @@ STORED = 8  # messages and ticks
 
 
 class Errors(NamedTuple):
-    """Norms of estimate − reference: position [m], attitude [rad], arm [rad]; and the tilt [rad].
+    """Norms of estimate − reference, and the tilt."""
 
-    position, attitude: 0 while they are not controlled. tilt: angle between the vertical axes of
-    body and world.
-    """
-
-    position: float = 0.0
-    attitude: float = 0.0
-    arm: float = 0.0
-    tilt: float = 0.0
+    position: float = 0.0  # [m] 0 while it is not controlled
+    attitude: float = 0.0  # [rad] the same
+    arm: float = 0.0  # [rad]
+    tilt: float = 0.0  # [rad] angle between the vertical axes of body and world
 
 
 class TrackingErrors:

@@ -1,13 +1,6 @@
 """Ways into the mission node for planners: goal pose and trajectories, each with an answer.
 
-| topic | type | does |
-|---|---|---|
-| `goal_pose` | geometry_msgs/PoseStamped | fly to a pose and hold there |
-| `base_trajectory` | trajectory_msgs/MultiDOFJointTrajectory | fly a trajectory of the base |
-| `arm_trajectory` | trajectory_msgs/JointTrajectory | move the arm along a trajectory |
-| `end_effector/goal_pose` | geometry_msgs/PoseStamped | bring the end effector to a pose |
-| `end_effector/trajectory` | trajectory_msgs/MultiDOFJointTrajectory | and along a trajectory |
-| `end_effector/twist` | geometry_msgs/TwistStamped | move it until the messages stop |
+The topics: docs/scenarios.md, Planners; docs/end_effector.md, Commands; types: docs/interfaces.md.
 
 The answer is a line in the log (at most one accepted and one refused per second and topic), an
 entry in /diagnostics, and `answers` (how many goals and trajectories were answered) with `answer`

@@ -53,13 +53,12 @@ def read_base_trajectory(data: bytes) -> Points:
 
 
 class Body(NamedTuple):
-    """The points of a body: times (m,) [s], positions (m, 3) [m], rotations (m, 4): x y z w; rates
-    (2, m, 4): velocities and accelerations of x y z yaw, rows of NaN where not given."""
+    """The points of a body."""
 
-    times: np.ndarray
-    positions: np.ndarray
-    rotations: np.ndarray
-    rates: np.ndarray
+    times: np.ndarray  # (m,) [s]
+    positions: np.ndarray  # (m, 3) [m]
+    rotations: np.ndarray  # (m, 4): x y z w
+    rates: np.ndarray  # (2, m, 4): velocities and accelerations of x y z yaw, NaN where not given
 
 
 def read_body(data: bytes, name: str) -> Body:

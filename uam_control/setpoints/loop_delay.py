@@ -77,11 +77,7 @@ class DelaySums(NamedTuple):
 
 
 class LoopDelay:
-    """Measures the delay of the attitude loop.
-
-    `numbers`, `sums`: what the compiled `follow` reads and writes at each tick. The fit is made
-    when a value is asked for.
-    """
+    """Measures the delay of the attitude loop; the fit is made when a value is asked for."""
 
     def __init__(self, motor_lag: float, period: float) -> None:
         """motor_lag [s]: of the rotors' speed; period [s]: of the control ticks."""

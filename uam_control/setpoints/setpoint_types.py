@@ -1,9 +1,7 @@
 """The setpoint types by name: which part of the desired motion is sent, what of the laws acts.
 
-Rates: tau_q acts through the autopilot's rate loop. Wrench: no loop of the autopilot acts on the
-attitude. Attitude: the autopilot's own attitude loop controls, tau_q is not used. Position: the
-autopilot's position control follows the reference, tau_p and tau_q are not used; the arm is still
-controlled by the arm law. Without a reference (idle, level hold) attitude and thrust are sent.
+See docs/autopilot.md, Attitude, position or torque. With each the arm law controls the arm. Without
+a reference (idle, level hold) attitude and thrust are sent.
 
 A new type is a function and a line in SETPOINTS.
 """

@@ -253,10 +253,7 @@ def new_memory() -> np.ndarray:
 
 
 class ThrustIdentification:
-    """Estimate of the thrust factor, and the conditions under which it changes.
-
-    `record`, `memory`: what the compiled `identify` reads and writes.
-    """
+    """Estimate of the thrust factor, and the conditions under which it changes."""
 
     def __init__(
         self,
@@ -266,7 +263,7 @@ class ThrustIdentification:
         """parameters: None for those of the vehicle; vehicle: None for the default one."""
         vehicle = vehicle or load_description()
         self._gravity = vehicle.gravity
-        self.memory = new_memory()
+        self.memory = new_memory()  # with `record` what the compiled `identify` reads and writes
         self._switches: deque[tuple[float, bool]] = deque()
         first = (parameters or ThrustIdentificationParameters.of(vehicle)).validated()
         self.record = numbers(first, self._gravity)

@@ -7,7 +7,6 @@
 
 The reader leaves out the parameters that ROS declares in every node; a dump contains them. Files
 of several nodes can be concatenated.
-A vehicle in a namespace has its sections under `mission:` or `/uav1/mission:`.
 """
 
 from collections.abc import Iterator, Mapping

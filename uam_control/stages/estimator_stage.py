@@ -83,13 +83,10 @@ class StageArrays(NamedTuple):
 class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
-    All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before:
-    `mocap` and `joints` are `take_pose` and `take_readings` of this stage.
-    `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
+    All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
-    `StateEstimator.bias_known`; `state` (3, 6 + n): of the newest tick;
-    `diverged`: how often the estimate has, which then begins anew;
-    `held_until` [ns]: without states since then; `arrays`: the whole state, never replaced.
+    `StateEstimator.bias_known`; `diverged`: how often the estimate has, which then begins anew;
+    `held_until` [ns]: without states since then.
     """
 
     bias_due, diverged, held_until = Number(), Number(), Number()
@@ -105,8 +102,8 @@ class EstimatorStage:
 
     def _share(self, joints: int) -> None:
         """Make `arrays`, and the functions of this stage on them."""
-        self.arrays = a = StageArrays(self.estimator.arrays, *self._own)
-        self.state, *_ = arrays_of(a.estimator.memory)
+        self.arrays = a = StageArrays(self.estimator.arrays, *self._own)  # never replaced
+        self.state, *_ = arrays_of(a.estimator.memory)  # (3, 6 + n) of the newest tick
         sample, angles = np.zeros(3), np.zeros(joints)
         self.mocap = bound(take_pose, a, 0, sample, np.zeros(4))
         self.joints = bound(take_readings, a, 0, angles, angles)

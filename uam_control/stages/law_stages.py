@@ -49,8 +49,7 @@ POSITION, ATTITUDE, ARM = range(3)  # numbers in SUBSYSTEMS
 class MeasuredDelay:
     """The loop delay that the bridge reports, for the attitude law of a later tick.
 
-    A report is used when it has arrived in every engine, REPORT_DELAY after its stamp. `apply`:
-    `apply_reports` of these arrays.
+    A report is used when it has arrived in every engine, REPORT_DELAY after its stamp.
     """
 
     def __init__(self, controller: AttitudeController) -> None:
@@ -89,8 +88,7 @@ def apply_reports(
 class LawStage:
     """One controller and its time steps.
 
-    `gains_due`: whether to publish the adapted gains of the last tick, for the recording and the
-    supervisor; `begin`: `step_to` of this stage.
+    `gains_due`: whether to publish the last tick's adapted gains, for recording and supervisor.
     """
 
     gains_due = Flag()
@@ -258,8 +256,7 @@ def keep_gains(
 
 
 class HandStage:
-    """Stabilisation of the hand: corrects the reference of the arm law; `arrays`: what compiled
-    functions use."""
+    """Stabilisation of the hand: corrects the reference of the arm law."""
 
     def __init__(
         self,

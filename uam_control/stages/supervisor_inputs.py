@@ -46,19 +46,18 @@ class StageArrays(NamedTuple):
 
 
 class SupervisorInputs:
-    """Keeps messages until the next reading; `readings`: of the last tick, see `Readings`;
-    `clock` (1,): of the poses; `arrays`: what compiled functions use, None before `share`."""
+    """Keeps messages until the next reading."""
 
     _read_at = Number()
 
     def __init__(self, control_period: float) -> None:
         """control_period [s]: time between two ticks."""
         self.inputs = Inputs(control_period)
-        self.readings = Readings()
-        self.clock = new_clock()
+        self.readings = Readings()  # of the last tick
+        self.clock = new_clock()  # (1,) of the poses
         self._kept: dict[str, list[Kept]] = {}
         self._joints, self._names = 0, []
-        self.arrays: StageArrays | None = None
+        self.arrays: StageArrays | None = None  # what compiled functions use, None before `share`
         self.memory = record("read_at")  # [ns] tick of the last reading
         self._read_at = -READ_PERIOD
 

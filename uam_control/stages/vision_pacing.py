@@ -47,7 +47,6 @@ class VisionPacing:
     """Stores the newest pose and sends it when the interval has passed.
 
     PX4 recommends 30 to 50 Hz: a higher rate does not improve its EKF and loads a serial line.
-    `take`: `take_pose` of these arrays.
     """
 
     def __init__(self, parameters: VisionParameters) -> None:

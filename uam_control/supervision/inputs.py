@@ -45,8 +45,7 @@ class InputArrays(NamedTuple):
 
 class Inputs:
     """Newest values and their stamps. Ages are differences of stamps and do not depend on the time
-    of delivery. `arrays`: what compiled functions use; `mocap`, `accelerometer_bias`: `take_pose`
-    and `take_bias` of these."""
+    of delivery."""
 
     _autopilot, _last = Number(), Known()
 

@@ -16,16 +16,13 @@ UNKNOWN = "unknown"
 
 
 class PreflightCheck(NamedTuple):
-    """One line of a report; value and limit with their units.
-
-    standing: of the checklist, judged only while nobody moves the vehicle.
-    """
+    """One line of a report; value and limit with their units."""
 
     name: str
     value: str
     limit: str
     passed: bool
-    standing: bool = False
+    standing: bool = False  # of the checklist, judged only while nobody moves the vehicle
 
     @property
     def text(self) -> str:
