@@ -62,10 +62,7 @@ class Body(NamedTuple):
 
 
 def read_body(data: bytes, name: str) -> Body:
-    """Return the points of a serialized MultiDOFJointTrajectory of one body; raises BadMessage.
-
-    name: of the body, for errors.
-    """
+    """Return the only body of a MultiDOFJointTrajectory; raises BadMessage with `name`."""
     trajectory = _Trajectory(data)
     check_frame(trajectory.layout.frame)
     if len(trajectory.layout.names) > 1:

@@ -172,10 +172,7 @@ class ParameterSet:
 
     @classmethod
     def among(cls, values: Mapping[str, Any], axes: int = 0) -> Self:
-        """Return a validated set of those `values` that belong to it; ignore the others.
-
-        axes: number of entries of a per-axis vector.
-        """
+        """Return the set of those `values` that belong to it, `validated` for `axes`."""
         return cls.from_mapping({k: v for k, v in values.items() if k in cls.specs()}, axes)
 
     def validated(self, axes: int = 0) -> Self:

@@ -206,9 +206,8 @@ class BridgeStage:
     ) -> Setpoint:
         """Send the setpoint of a tick with commands, and return it; None: none was sent.
 
-        state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,) [N m, FLU], None
-        for idle; attitude (3, 3): of the position law, reference (3, 3): of the mission, see
-        `Desired`.
+        Arguments as of `SetpointSource.commanded`; attitude: of the position law, reference: of the
+        mission.
         """
         now, situation = stamp / SECOND, self._situation
         setpoint = self.source.commanded(

@@ -156,10 +156,7 @@ class Inputs:
 
 @borrowing
 def take_pose(a: InputArrays, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-    """Store a mocap pose exposed at `stamp` [s].
-
-    position (3,) [m, world]; quaternion (4,) body → world [w x y z].
-    """
+    """Store a pose, see `Estimator.mocap`; the quaternion turns body → world."""
     m = a.numbers[0]
     m.mocap = stamp
     put(position, a.known.position)

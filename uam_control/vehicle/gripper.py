@@ -37,10 +37,7 @@ class Gripper:
 
 
 def closes(opening: float, ends: tuple[float, float]) -> bool | None:
-    """Return whether a command of `opening` closes a gripper; None: it is outside of the ends.
-
-    ends: closed and open, as `Gripper.opening`.
-    """
+    """Return whether a command closes a gripper; None: outside of its ends, `Gripper.opening`."""
     closed, opened = ends
     if not min(ends) <= opening <= max(ends):
         return None
