@@ -292,7 +292,9 @@ def test_a_matrix_from_the_command_line(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["faults", "--matrix", str(file), "--jobs", "2", "--out", str(out)]) == 0
     message = capsys.readouterr().out
-    assert "4 flights with a fault: 2 completed" in message and "Only with --engine ros" in message
+    assert "4 flights with a fault: 2 completed" in message
+    why = "node_kill: the direct engine has no processes: needs --engine ros"
+    assert f"left out: {why}" in message and f"Left out: {why}." in message
     reported = json.loads((out / "faults.json").read_text())["flights"]
     assert [(f["fault"], f["moment"]) for f in reported][:3] == [
         ("no fault", ""),

@@ -214,8 +214,8 @@ def test_what_another_scenario_or_vehicle_does_not_have_is_left_out_with_its_rea
     assert [cell.fault for cell in matrix.cells(1)] == [fault_matrix.NOMINAL, "mocap_jump"]
     assert list(matrix.moments) == ["a"]
     assert matrix.left_out["b"].startswith("no phase 'drop' in two_finger, which has: take-off,")
-    assert matrix.left_out["servo_jam (joint 3)"] == "servo_jam: joint 3: the vehicle has 2"
-    assert matrix.left_out["magnet_stuck"] == "magnet_stuck: none of its moments: b"
+    assert matrix.left_out["servo_jam (joint 3)"] == "joint 3: the vehicle has 2"
+    assert matrix.left_out["magnet_stuck"] == "none of its moments: b"
     with pytest.raises(FaultError, match="nothing to fly: .*the vehicle has 2"):
         fault_matrix.read(file, "direct", only=["servo_jam"])
     file.write_text(file.read_text().replace("a: {at: take-off}", "a: {at: pick}"))

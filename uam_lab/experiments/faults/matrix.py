@@ -232,9 +232,9 @@ def _impossible(
     try:
         feasibility.check(Schedule((TimedFault(row.fault, 0.0),)), engine, vehicle=vehicle)
     except FaultError as error:
-        return str(error)
+        return str(error).removeprefix(f"{row.fault.NAME}: ")
     if row.moments and not set(row.moments) & set(times):
-        return f"{row.fault.NAME}: none of its moments: {', '.join(row.moments)}"
+        return f"none of its moments: {', '.join(row.moments)}"
     return ""
 
 
