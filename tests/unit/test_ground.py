@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from uam_control.mission.ground import carried, seek_ground
+from uam_control.mission.ground import seek_ground, supported
 
 
 def state_at(height, rate=0.0):
@@ -27,7 +27,5 @@ def test_a_reference_goes_on_downwards_after_its_end(since, height, rate):
     ("height", "rate", "stands"),
     [(0.06, 0.0, True), (0.06, -0.09, True), (0.06, -0.2, False), (0.04, 0.0, False)],
 )
-def test_a_vehicle_is_carried_that_stays_a_quarter_of_a_metre_above_its_descent(
-    height, rate, stands
-):
-    assert carried(state_at(height, rate), state_at(-0.2, -0.2), 0.1) is stands
+def test_a_vehicle_stands_that_stays_a_quarter_of_a_metre_above_its_descent(height, rate, stands):
+    assert supported(state_at(height, rate), state_at(-0.2, -0.2), 0.1) is stands

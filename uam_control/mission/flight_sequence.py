@@ -15,9 +15,9 @@ from uam_control.mission.ground import (
     GroundPose,
     Standing,
     Touchdown,
-    carried,
     on_ground,
     seek_ground,
+    supported,
 )
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_output import (
@@ -221,8 +221,7 @@ class FlightSequence:
             decision = self._supervisor.step(stamp, seen, None if moved else command)
             if guidance is not None:
                 guidance.write(stamp)
-                if (since := self._since_arrival(decision)) > 0.0:
-                    seek_ground(output.reference, since)
+                seek_ground(output.reference, self._since_arrival(decision))
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
                     guidance.stay(stamp, state, self._ground, self._age)
@@ -301,7 +300,7 @@ class FlightSequence:
         seen.arrived = planned and guidance.arrived(stamp)
         if time >= landing.half or touchdown.late_in_descent(stamp):
             if self._odometry:
-                stands = carried(state, self.output.reference, p.touchdown_speed)
+                stands = supported(state, self.output.reference, p.touchdown_speed)
             else:
                 stands = seen.on_ground
             seen.touchdown = touchdown.at_rest(stamp, stands, p)

@@ -10,7 +10,7 @@ from uam_control.mission.mission_output import DRY_RUN, HAND_CHECK, MissionOutpu
 from uam_control.mission.mission_parameters import MissionParameters
 
 SEEKING = 0.2  # [m/s] downwards, of a reference that seeks the ground
-BEHIND = 0.25  # [m] of a vehicle above such a reference: the ground carries it
+BEHIND = 0.25  # [m] of a vehicle above such a reference: it stands
 SINKING, STILL = 0.2, 0.05  # [m/s] downwards: a landing, and the end of it
 
 
@@ -67,8 +67,8 @@ def seek_ground(reference: np.ndarray, since: float) -> None:
         reference[CHI_DOT, Z] -= SEEKING
 
 
-def carried(state: np.ndarray, reference: np.ndarray, speed: float) -> bool:
-    """Return whether the vehicle does not follow a descent, so that something carries it.
+def supported(state: np.ndarray, reference: np.ndarray, speed: float) -> bool:
+    """Return whether the vehicle does not follow a descent: it stands on something.
 
     state, reference (3, 6 + n); speed [m/s]: that counts as at rest.
     """

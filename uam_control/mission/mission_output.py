@@ -12,10 +12,7 @@ WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "abo
 RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
 HAND_CHECK = "hand check"  # a person tilts the disarmed vehicle, see docs/preflight.md
 TOUCHDOWN = "touchdown"  # a landing seeks the ground, see `ground.seek_ground`
-PHASES = (
-    *(WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CHECK),
-    TOUCHDOWN,
-)
+PHASES = (WAITING, HOLD, LAND, TOUCHDOWN, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CHECK)
 
 
 @dataclass
