@@ -157,6 +157,13 @@ def test_a_profile_without_law_is_modular_and_an_unknown_law_is_refused(tmp_path
         load_profile(str(file))
 
 
+def test_a_law_without_profile_that_needs_one_is_refused_by_its_name(monkeypatch):
+    mine = type("Mine", (LAWS["asmc1"],), {"profile": ""})
+    monkeypatch.setitem(LAWS, "asmc1", mine)
+    with pytest.raises(ProfileError, match="^law asmc1: position_controller: inertia is missing"):
+        default_profile("asmc1")
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_the_parameters_of_a_controller_survive_pickling(law):
     for node, values in default_profile(law).sets.items():

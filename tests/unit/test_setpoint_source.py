@@ -18,7 +18,7 @@ from uam_control.maths.rotations import (
 from uam_control.setpoints.level_hold import HoldParameters
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
 from uam_control.setpoints.setpoint_source import SetpointSource, Situation
-from uam_control.setpoints.setpoint_types import SETPOINTS
+from uam_control.setpoints.setpoint_types import SETPOINTS, SetpointParameters
 from uam_control.setpoints.targets import ATTITUDE as ATTITUDE_TARGET
 from uam_control.setpoints.thrust_curve import thrust_of_command
 from uam_control.vehicle import GRAVITY
@@ -158,6 +158,11 @@ def desired(target) -> np.ndarray:
     """Roll, pitch, yaw [rad, FLU in ENU] of an attitude setpoint."""
     assert target.type_mask == 7 and np.isnan(target.body_rates).all()
     return euler_from_quaternion(swap_quaternion(target.quaternion))
+
+
+def test_a_setpoint_type_of_the_user_can_be_chosen(monkeypatch):
+    monkeypatch.setitem(SETPOINTS, "mine", SETPOINTS["rates"])
+    assert SetpointParameters.from_mapping({"setpoint": "mine"}).type is SETPOINTS["rates"]
 
 
 def test_attitude_setpoints_are_the_position_laws_attitude_with_the_same_thrust():

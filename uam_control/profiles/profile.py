@@ -50,6 +50,15 @@ FOLLOWED, TURNED = 0.9, 0.75
 # rates of the hand that count as rest, [s] after the last message of a jog
 RESTING, RESTS_AFTER = {"jog_speed": 0.005, "jog_turn_rate": math.radians(1.0)}, 0.3
 STOPS = 3.0  # times the time constant of the attitude: a stop that it follows
+# what helps against a missing parameter
+WHOLE_FIRST = (
+    "a file with a part of the parameters needs a whole profile before it, as --profile s500 "
+    "--profile {}"
+)
+NEEDS_PROFILE = (
+    "name a file with it as `profile` of the law's class, or give it a default, or the "
+    f"description, unit and range that it has in the law {catalogue.DEFAULT}"
+)
 # of the process of every node
 PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
@@ -269,7 +278,7 @@ def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Prof
         sections[node] = {"law": law} | shared
     if part := vehicle.profile(law):
         return load_profile(part, vehicle=vehicle, onto=sections)
-    return profile_of(sections, Path(f"{law}.yaml"), vehicle)
+    return replace(profile_of(sections, Path(f"law {law}"), vehicle, NEEDS_PROFILE), name=law)
 
 
 def complete_profile(law: str, vehicle: VehicleDescription) -> str:
@@ -331,11 +340,15 @@ def jog_limits(attitude: AttitudeLimits) -> dict[str, float]:
 
 
 def profile_of(
-    sections: dict[str, dict[str, Any]], file: Path, vehicle: VehicleDescription | None = None
+    sections: dict[str, dict[str, Any]],
+    file: Path,
+    vehicle: VehicleDescription | None = None,
+    advice: str = WHOLE_FIRST,
 ) -> Profile:
     """Return the checked profile of the raw `sections`; raises ProfileError.
 
-    file: named in the profile and in errors; vehicle: see `load_profile`.
+    file: named in the profile and in errors; vehicle: see `load_profile`; advice: for a missing
+    parameter.
     """
     sets, vehicle = {}, vehicle or load_description()
     given = {node: sections.get(node, {}).get("law", catalogue.DEFAULT) for node in CONTROLLERS}
@@ -357,8 +370,7 @@ def profile_of(
             kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))
         except MissingParameter as error:
-            hint = "a file with a part of the parameters needs a whole profile before it"
-            text = f"{file}: {node}: {error}; {hint}, as --profile s500 --profile {file.name}"
+            text = f"{file}: {node}: {error}; {advice.format(file.name)}"
             raise ProfileError(text) from None
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None

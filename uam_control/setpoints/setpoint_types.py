@@ -77,7 +77,7 @@ class SetpointParameters(ParameterSet):
         "rates",
         "what is sent: rates, attitude or wrench (torque) with the thrust, or position; only rates "
         "and wrench act as tau_q",
-        tuple(SETPOINTS),
+        SETPOINTS,
     )
 
     setpoint_rate: float = number(
