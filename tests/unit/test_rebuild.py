@@ -26,7 +26,7 @@ def rehearsed(tmp_path):
 def test_a_rehearsal_keeps_its_latencies(rehearsed, tmp_path):
     for out in (rehearsed, tmp_path / "again"):
         found = rebuild(rehearsed, out)
-        assert found["latency_ms"]["p50"] == pytest.approx(3.0) and found["missed_ticks"] == 8
+        assert found["latency_ms"]["p50"] == pytest.approx(3.0) and found["missed_ticks"] == 5
         assert json.loads((out / "metrics.json").read_text()) == found
 
 

@@ -212,9 +212,9 @@ def test_latencies_and_missed_ticks():
     states = [4 * ms * k for k in range(1, 6)]
     setpoints = [states[0], states[1], states[4]]  # two ticks without a setpoint
     sent = [states[0] + 2 * ms, states[1] + 13 * ms, states[4] + 5 * ms]  # one is late
-    found, missed = latencies(FakeLog(states, setpoints, sent), 0.004)
+    found, missed = latencies(FakeLog(states, setpoints, sent), 0.004, np.array(states))
     assert found == pytest.approx([0.002, 0.013, 0.005]) and missed == 3
-    assert latencies(FakeLog(states, [], []), 0.004)[1] == 5
+    assert latencies(FakeLog(states, [], []), 0.004, np.array(states))[1] == 5
 
 
 def test_latencies_of_given_ticks():

@@ -10,7 +10,6 @@ from uam_control.settings.atomic import copy, write_text
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.records.recording import log_facts
 from uam_lab.records.recording.log_reader import read_flight
-from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
 from uam_lab.records.results import timeseries
 from uam_lab.records.results.outcome import complete
 from uam_lab.records.results.result_folder import (
@@ -48,8 +47,6 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     numbers = known_json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
     latency, missed = outcome.latency_s, outcome.missed_ticks
-    if (directory / "logs" / LABORATORY_FILE).exists():  # of a rehearsal
-        latency, missed = latencies(Log.read(log), vehicle.control_period)
     outcome.wall_s = numbers.get("wall_s") or before.get("wall_s") or outcome.wall_s
     outcome.latency_s = numbers.get("latency_s", latency) if realtime else None
     outcome.missed_ticks = numbers.get("missed_ticks", missed) if realtime else None

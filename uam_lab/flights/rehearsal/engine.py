@@ -26,7 +26,7 @@ from uam_lab.flights.vehicle import vehicle_nodes
 from uam_lab.flights.vehicle.lab_file import Lab, settings_of
 from uam_lab.flights.vehicle.vehicle_engine import VehicleCourse
 from uam_lab.flights.vehicle.vehicle_nodes import CHECKLIST
-from uam_lab.records.recording.logged_topics import LABORATORY_FILE, Log, latencies
+from uam_lab.records.recording.logged_topics import LABORATORY_FILE
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, known_json, write_json
 from uam_msgs_py.messages import topics
@@ -117,8 +117,6 @@ def read_outcome(
     outcome.wall_s = float(numbers.get("wall_s", 0.0))
     if outcome.series is None:
         return outcome
-    found = latencies(Log.read(folder.log), settings.vehicle.control_period)
-    outcome.latency_s, outcome.missed_ticks = found
     if not outcome.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome

@@ -309,9 +309,8 @@ def read_outcome(
     outcome = logged(settings, folder, failure, interrupted, notes)
     if not outcome.errors_of:  # in simulation
         outcome.wall_s = numbers.get("wall_s", 0.0)
-        if realtime:
-            outcome.latency_s = numbers.get("latency_s", [])
-            outcome.missed_ticks = numbers.get("missed_ticks")
+        outcome.latency_s = numbers.get("latency_s", []) if realtime else None
+        outcome.missed_ticks = numbers.get("missed_ticks") if realtime else None
     if outcome.series is None or outcome.done or outcome.partial:
         return outcome
     full = known_json(logs / RECORDER).get("ended")

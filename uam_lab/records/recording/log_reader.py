@@ -85,7 +85,7 @@ def read_flight(
     """Return the outcome of the flight of `scenario` recorded in `path`: what the log has of it.
 
     vehicle: of a log without the simulator's topics, None for the default one; latencies are of
-    such a log only. Raises UnreadableLog if the file is no log or its flight did not start.
+    the wall clock. Raises UnreadableLog if the file is no log or its flight did not start.
     """
     log = Log.read(path)
     statuses = log.statuses()
@@ -158,9 +158,10 @@ def read_flight(
         notes=[*log.notes, *notes],  # the last: what is read above adds some
     )
     if not simulated:
-        latency, missed = latencies(log, vehicle.control_period, ticks)
         outcome.errors_of = ESTIMATE
-        outcome.latency_s, outcome.missed_ticks = latency.tolist(), missed
+    begin, end = (ticks[flying] if flying.any() else ticks)[[0, -1]]
+    flown = state.stamps[(state.stamps >= begin) & (state.stamps <= end)]
+    outcome.latency_s, outcome.missed_ticks = latencies(log, vehicle.control_period, flown)
     return outcome
 
 
