@@ -201,7 +201,7 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     assert np.isnan(series["rotor_1.thrust"]).all() and np.isnan(series["magnet.force"]).all()
     np.testing.assert_allclose(series["payload.y"], 2.0)
     np.testing.assert_array_equal(series["magnet.on"][[0, 499, 500]], [0.0, 0.0, 1.0])
-    assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed_ticks == 8
+    assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed_ticks == 5
     assert flight.wall_s == pytest.approx(2.996)
 
 
