@@ -98,11 +98,10 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("revision", help="git revision to compare with")
-    parser.add_argument("--engines", nargs="+", default=["direct", "ros"])
+    engines, names = ("direct", "ros", "fused"), ("all", *FLIGHTS)
+    parser.add_argument("--engines", nargs="+", default=["direct", "ros"], choices=engines)
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 7])
-    parser.add_argument(
-        "--flights", nargs="+", default=["paper"], help=", ".join(["all", *FLIGHTS])
-    )
+    parser.add_argument("--flights", nargs="+", default=["paper"], choices=names)
     options, options.further = parser.parse_known_args()
     git = ["git", "-C", str(HERE), "worktree"]
     with tempfile.TemporaryDirectory(prefix="same-flights-") as folder:
