@@ -66,6 +66,13 @@ def test_buttons_offer_what_the_state_allows(state, time, possible):
     assert {name for name in names if not refusal(BY_NAME[name], seen)} == possible
 
 
+def test_start_begins_the_next_flight():
+    seen = health(State.DISARMED, done=True)
+    assert refusal(BY_NAME["Start"], seen) == ""
+    seen.preflight = [PreflightCheck("place", "9 m", "2 m", passed=False)]
+    assert refusal(BY_NAME["Start"], seen) == "pre-arm report: place"
+
+
 def test_start_names_the_failed_checks_and_magnet_its_state():
     seen = health(State.GROUNDED, -1.0)
     seen.preflight = [PreflightCheck("battery", "3 %", "20 %", passed=False)]
@@ -167,7 +174,10 @@ def test_only_the_page_commands(served):
     (secret,) = re.findall(rf'"{HEADER}": "([^"]+)"', page)
     assert get(server, "/command?is=Kill")[0] == 403
     assert get(server, "/command?is=Kill", **{HEADER: "x"})[0] == 403
+    assert get(server, "/command?is=Kill", **{HEADER: "\xe9"})[0] == 403
     assert get(server, "/command?is=Fly", **{HEADER: secret})[0] == 404
+    assert get(server, "//[", **{HEADER: secret})[0] == 404
+    assert get(server, "/command?is=Land&is=Fly", **{HEADER: secret})[0] == 404
     assert todo.empty()
     assert get(server, "/command?is=Land", **{HEADER: secret})[0] == 200
     todo.get()()

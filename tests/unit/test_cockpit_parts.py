@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from visualization_msgs.msg import Marker, MarkerArray
 
+from uam_control.settings.parameter_set import Bound
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
-from uam_lab.cockpit.gains import axes, bounds, reach, text_of, value_of
+from uam_lab.cockpit.gains import ParameterEntry, axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import ChecklistPanel, _facts, checklist_html, headline
 from uam_lab.cockpit.page import BUTTONS
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, CHAIN, GOOD, TICK, UNKNOWN, Health, grade
@@ -32,6 +33,7 @@ from uam_msgs_py.messages.status import (
 )
 from uam_msgs_py.messages.tf_message import Transform, read_transforms, transforms_message
 from uam_msgs_py.messages.topics import WORLD
+from uam_msgs_py.node.node_parameters import descriptor
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
 
@@ -63,6 +65,32 @@ def test_what_is_typed_is_what_was_shown(value):
 def test_what_cannot_be_read_is_refused(text, like):
     with pytest.raises(ValueError, match="expected"):
         value_of(text, like)
+
+
+class Widgets:
+    """viser's panel, as far as an entry needs it."""
+
+    def _made(self, *given, **look):
+        handle = SimpleNamespace(value=given[-1] if given else "", step=given[3:4], **look)
+        handle.on_update = handle.on_submit = lambda act: None
+        return handle
+
+    def add_folder(self, label, **look):
+        return nullcontext(self._made())
+
+    add_form = add_folder
+    add_html = add_text = add_slider = _made
+
+
+def test_a_whole_number_stays_one():
+    asked, spec = [], Bound("approaches", "", 1, 20, whole=True)
+    remote = SimpleNamespace(known={"n": descriptor(spec, False)}, values={"n": 3}, node="mission")
+    remote.set = lambda changes, answer: asked.append(changes["n"])
+    entry = ParameterEntry(Widgets(), "n", remote, lambda act: act(), lambda done, text: None)
+    for typed in ("4", "2.5"):
+        entry._ask_for(typed)
+    assert [repr(one) for one in asked] == ["4", "2.5"]  # the node refuses the second
+    assert reach(remote.known["n"], 3.0)[2] == 1.0
 
 
 @given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(0.0, 1.0))
@@ -113,6 +141,10 @@ def test_the_headline_shows_the_state():
     assert "<b>no" not in page
     assert "saturated" not in page
     for status, message in (
+        (
+            MissionStatus("hold", state="blind", cause="no pose"),
+            (CAUTION, "blind", "no pose"),
+        ),
         (
             MissionStatus("hold", state="holding", cause="by command"),
             (CAUTION, "holding", "by command"),

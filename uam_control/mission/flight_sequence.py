@@ -52,6 +52,7 @@ from uam_control.supervision import (
     Supervisor,
 )
 from uam_control.supervision.checks import Checks
+from uam_control.supervision.states import STOPPED_STATES
 from uam_control.vehicle import VehicleDescription
 
 # takes_off: whether the vehicle is not airborne yet. [s]: newest step, take-off; ground [m] below
@@ -403,7 +404,7 @@ class FlightSequence:
             return  # it goes on
         self._descent = None
         planned = decision.guide is Guide.SCENARIO or event is Event.TOUCHDOWN
-        waits = state in (State.HOLDING, State.RELEASED, State.BLIND)
+        waits = state in STOPPED_STATES
         self._fell_since = math.inf
         if before is State.FAILSAFE and event is Event.AGREES:
             self.output.abort_reason = ""

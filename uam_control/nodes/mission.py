@@ -40,6 +40,7 @@ from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, State
 from uam_control.supervision.checks import margin_left
 from uam_control.supervision.inputs import SUBSYSTEMS
+from uam_control.supervision.states import STOPPED_STATES
 from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import preflight_message
@@ -67,7 +68,6 @@ PATH_STEP = 0.25  # [s] between two poses of the path
 PATH_LENGTH = 250.0  # [s] of the flight in it: a tick must not wait for the path of hours
 HAND_PERIOD = 20_000_000  # [ns] between two references of the end effector
 WATCH_PERIOD = 0.05  # [s] of the watch on states
-ODD = State.HOLDING, State.RELEASED
 
 
 @dataclass(frozen=True)
@@ -319,7 +319,7 @@ class MissionNode(UamNode):
         output = self._mission.output
         text = f"{output.phase} at {output.time:.3f} s; {output.state.value}: {output.cause}"
         text += ", done" if output.done else ""
-        self.note(text, bool(output.abort_reason) or output.state in ODD)
+        self.note(text, bool(output.abort_reason) or output.state in STOPPED_STATES)
 
     def _log_held_back(self) -> None:
         """Log once which limit prevents the take-off, and that it does no longer."""
@@ -341,7 +341,7 @@ class MissionNode(UamNode):
         if delay > limits.delay_warn * limits.delay_margin:
             share = 100.0 * margin_left(delay, limits)
             late = f"setpoints {1e3 * delay:.0f} ms late: {share:.0f} % of the delay margin left"
-        level = WARN if beyond or output.state in ODD or late else OK
+        level = WARN if beyond or output.state in STOPPED_STATES or late else OK
         if output.abort_reason:
             level = ERROR
         summary = output.abort_reason or beyond or late or output.phase

@@ -84,6 +84,7 @@ AIRBORNE_STATES = (
     State.BLIND,
     State.FAILSAFE,
 )
+STOPPED_STATES = State.HOLDING, State.RELEASED, State.BLIND  # the scenario's clock stops
 _S, _E = State, Event
 _GUIDED = AIRBORNE_STATES[:4]
 # from each of these states, to this one, by each of these events

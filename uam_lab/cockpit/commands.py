@@ -82,6 +82,8 @@ def refusal(button: Button, health: Health) -> str:
     if state is None:
         return ""
     failed = [check.name for check in health.preflight if not check.passed]
+    if button is START and mission.done:
+        state = State.GROUNDED  # it begins the next flight
     if button.events and not any((state, event) in TARGETS for event in button.events):
         return f"not while {state.value}"
     if button is START and failed:

@@ -54,7 +54,7 @@ def reach(about: ParameterDescriptor, value: float) -> tuple[float, float, float
     high = min(high, max(REACH * value, 1.0 if value == 0.0 else value / REACH))
     high = max(high, value)
     low = min(low, value)
-    return low, high, (high - low) / STEPS or 1.0
+    return low, high, 1.0 if about.integer_range else (high - low) / STEPS or 1.0
 
 
 def bounds(about: ParameterDescriptor) -> tuple[float, float]:
@@ -160,6 +160,8 @@ class ParameterEntry:
 
     def _set(self, value: Any) -> None:
         self._sent = time.monotonic()
+        if self._about.integer_range and float(value).is_integer():
+            value = int(value)
 
         def answered(why: str) -> None:
             if why:

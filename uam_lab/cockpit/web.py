@@ -13,7 +13,7 @@ import secrets
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 import viser
 import websockets.asyncio.server
@@ -75,20 +75,20 @@ class PlainPage:
 
         sent: content of HEADER.
         """
-        parts = urlsplit(target)
-        if parts.path == ADDRESS:
+        path, _, query = target.partition("?")
+        if path == ADDRESS:
             return 200, HTML, self.page("plain.html.j2").encode()
-        if parts.path == STATE:
+        if path == STATE:
             return 200, JSON, self._state
-        if parts.path not in (COMMAND, GOTO):
+        if path not in (COMMAND, GOTO):
             return None
-        if sent is None or not secrets.compare_digest(sent.encode(), self._secret.encode()):
+        if sent is None or not secrets.compare_digest(ascii(sent), ascii(self._secret)):
             return 403, JSON, b'"not from this page"'
-        (what,) = parse_qs(parts.query, keep_blank_values=True).get("is", [""])
+        what = parse_qs(query, keep_blank_values=True).get("is", [""])[-1]
         commands = self._commands
-        if commands is None or (parts.path == COMMAND and what not in NAMES):
+        if commands is None or (path == COMMAND and what not in NAMES):
             return 404, JSON, b'"no such command"'
-        if parts.path == GOTO:
+        if path == GOTO:
             self._later(lambda: commands.goto(what))
         else:
             self._later(lambda: commands.call(NAMES[what]))

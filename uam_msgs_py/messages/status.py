@@ -187,10 +187,10 @@ class MissionStatus(_Status):
 
     @property
     def level(self) -> bytes:
-        """Return ERROR after an abort, WARN during a hold, else OK."""
+        """Return ERROR after an abort, WARN where the scenario stops, else OK."""
         if self.abort_reason:
             return ERROR
-        return WARN if self.state in ("holding", "released") else OK
+        return WARN if self.state in ("holding", "released", "blind") else OK
 
     @property
     def summary(self) -> str:
