@@ -111,9 +111,11 @@ def test_the_spaces_of_the_project_begin_inside_their_ranges(name):
     [
         ({"node": "nobody"}, "no such node"),
         ({"parameter": "lambda_9"}, "no such parameter"),
+        ({"parameter": "record"}, "no such parameter"),  # of the class, but no parameter
+        ({"high": 1e9}, "above 0, within 1e-09 to"),
         ({"entries": [3]}, "entries 0 to 2 are expected"),
         ({"entries": []}, "entries 0 to 2 are expected"),
-        ({"low": 7.0}, "0 < low < high"),
+        ({"low": 7.0}, "low < high are expected, above 0"),
     ],
 )
 def test_a_bad_knob_is_refused_by_name(tmp_path, knob, complaint):

@@ -8,6 +8,7 @@ from typing import Any, Self
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import NODES, Profile, default_profile
 from uam_control.settings import configuration
+from uam_control.settings.parameter_set import TINY, Bound, ParameterSet
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
 from uam_lab.experiments.trials.trial import Trial, TrialResult
@@ -198,17 +199,19 @@ def _knob(entry: Section, start: Profile) -> Knob:
     for node in nodes:
         if node not in NODES:
             raise TuningError(f"{knob.name}: no such node; there are: {', '.join(NODES)}")
-        _check(knob, getattr(start.sets[node], knob.parameter, None))
-    if not 0.0 < knob.low < knob.high:
-        raise TuningError(f"{knob.name}: 0 < low < high is expected")
+        _check(knob, start.sets[node])
     return knob
 
 
-def _check(knob: Knob, value: Any) -> None:
-    """Raise TuningError if the knob does not fit the parameter's `value`."""
+def _check(knob: Knob, values: ParameterSet) -> None:
+    """Raise TuningError if the knob does not fit its parameter of a node's `values`."""
+    spec = values.specs().get(knob.parameter)
+    if not isinstance(spec, Bound) or spec.whole:
+        raise TuningError(f"{knob.name}: no such parameter, or no real number")
+    if not max(spec.low, TINY) <= knob.low < knob.high <= spec.high:
+        raise TuningError(f"{knob.name}: low < high are expected, above 0, within {spec.allowed}")
+    value = getattr(values, knob.parameter)
     length = len(value) if isinstance(value, tuple) else 0
-    if value is None or isinstance(value, str | bool):
-        raise TuningError(f"{knob.name}: no such parameter, or not a number")
     if bool(length) != bool(knob.entries) or any(not 0 <= i < length for i in knob.entries):
         raise TuningError(
             f"{knob.name}: entries 0 to {length - 1} are expected"
