@@ -20,10 +20,10 @@ from uam_msgs_py.messages.status import MissionStatus
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def vehicles_log(tmp_path, truth=False):
+def vehicles_log(tmp_path, truth=False, released=range(0)):
     """A log of 3 s: the vehicle stands, then hovers 1 cm above its reference.
 
-    truth: with the true state and rotors, as a rehearsal.
+    truth: with the true state and rotors, as a rehearsal. released: ticks in which a pilot flies.
     """
     names = list(coordinates(2))
     state, reference = TrajectoryWriter(names), ReferenceWriter(2)
@@ -53,7 +53,11 @@ def vehicles_log(tmp_path, truth=False):
     for k in range(750):
         stamp = begun + k * 4_000_000
         since = max(0, k - 250) * 4_000_000
-        write(topics.REFERENCE, stamp, bytes(reference.fill(stamp, desired, k >= 250, since)))
+        write(
+            topics.REFERENCE,
+            stamp,
+            bytes(reference.fill(stamp, desired, k >= 250 and k not in released, since)),
+        )
         write(topics.STATE, stamp, bytes(state.fill(stamp, chi)))
         if truth:
             write(topics.TRUTH_STATE, stamp, bytes(state.fill(stamp, chi)))
@@ -61,9 +65,12 @@ def vehicles_log(tmp_path, truth=False):
         late = 20_000_000 if k % 100 == 0 else 3_000_000
         write(topics.SETPOINT, stamp, bytes(setpoint.fill(stamp, np.zeros(3), 0.5)), late)
         write(topics.PAYLOAD, stamp, bytes(payload.fill(stamp, np.array([1.0, 2.0, 0.1]), LEVEL)))
-    for k, magnet in ((0, False), (500, True)):
+    statuses = {0: MissionStatus("hover"), 500: MissionStatus("hover", magnet=True)}
+    if released:
+        statuses[released.start] = MissionStatus("released", state="released")
+        statuses[released.stop] = MissionStatus("hover")
+    for k, status in sorted(statuses.items()):
         stamp = begun + k * 4_000_000
-        message = MissionStatus("hover", magnet=magnet).to_message(stamp)
-        write(topics.MISSION_STATUS, stamp, serialize_message(message))
+        write(topics.MISSION_STATUS, stamp, serialize_message(status.to_message(stamp)))
     log.close()
     return tmp_path / "log.mcap"

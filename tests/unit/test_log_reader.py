@@ -205,6 +205,15 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     assert flight.wall_s == pytest.approx(2.996)
 
 
+def test_a_vehicle_that_a_pilot_flies_has_no_errors_of_its_own(tmp_path):
+    log = vehicles_log(tmp_path, released=range(400, 500))
+    series = log_reader.read_flight(log, load_scenario("hover")).series
+    rows = series.in_phase("released")
+    assert rows.sum() == 100 and series.flown[rows].all()
+    np.testing.assert_allclose(series["error.z"][rows], 0.0, atol=1e-12)
+    np.testing.assert_allclose(series["error.z"][series.flown & ~rows], 0.01)
+
+
 def test_a_tick_is_missed_after_three_control_periods_of_the_vehicle(tmp_path):
     slower = replace(load_description(), control_period=0.008)
     flight = log_reader.read_flight(vehicles_log(tmp_path), load_scenario("hover"), vehicle=slower)

@@ -17,7 +17,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
-from uam_control.mission.mission_output import ABORTED, LANDED, TOUCHDOWN, WAITING
+from uam_control.mission.mission_output import ABORTED, LANDED, RELEASED, TOUCHDOWN, WAITING
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
@@ -72,8 +72,13 @@ class References:
         rows = self.samples.rows
         flights = np.flatnonzero(rows[:, -1])
         if len(flights):
-            pose = [c for c in range(3 * size) if c % size < ALPHA]
+            pose = _of_pose(size)
             rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
+
+
+def _of_pose(size: int) -> np.ndarray:
+    """Return the numbers of the base's columns among those of a state or reference."""
+    return np.flatnonzero(np.arange(3 * size) % size < ALPHA)
 
 
 def read_flight(
@@ -144,6 +149,10 @@ def read_flight(
         recording.phases[number] = recording.phase_names.setdefault(
             name, len(recording.phase_names)
         )
+    released = np.flatnonzero(recording.phases == recording.phase_names.get(RELEASED, -1))
+    pose = _of_pose(columns.size)  # the mission's follows the vehicle, and is not published
+    to, of = (columns.block(name).start + pose for name in ("reference.", "estimate."))
+    values[np.ix_(released, to)] = values[np.ix_(released, of)]
     recording.count = len(ticks)
     faults = fault_records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
     outcome = Outcome(
