@@ -50,6 +50,7 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
         (["--seeds", "0"], "1 or more"),
         (["--payload-mass", "9"], "at most 5"),
         (["--profile", "mine"], "LABEL=FILE"),
+        (["--rows", "proposed", "--profile", "proposed=asmc1"], "the row proposed is there"),
     ],
 )
 def test_wrong_use_is_refused_in_one_line(options, message, tmp_path, capsys):

@@ -137,6 +137,11 @@ def test_laws_have_labels_and_an_unknown_one_its_name():
     assert [label(name) for name in names] == expected
 
 
+def test_a_law_with_the_label_of_another_is_called_by_its_name(monkeypatch):
+    monkeypatch.setitem(LAWS, "mine", LAWS["asmc1"])
+    assert [label("mine"), label("asmc1"), label("asmc2")] == ["mine", "asmc1", LAWS["asmc2"].label]
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_a_profile_selects_the_law(law):
     profile = default_profile(law)

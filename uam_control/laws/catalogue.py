@@ -32,8 +32,10 @@ def law(name: str) -> type[Law]:
 
 
 def label(name: str) -> str:
-    """Return the label of a law in tables and figures; for an unknown law, its name."""
-    return LAWS[name].label if name in LAWS else name
+    """Return the label of a law in tables and figures; its name, if the law is unknown or another
+    one has the label, too."""
+    labels = [law.label for law in LAWS.values()]
+    return LAWS[name].label if name in LAWS and labels.count(LAWS[name].label) == 1 else name
 
 
 def gain_names(axes: int) -> tuple[str, ...]:

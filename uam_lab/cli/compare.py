@@ -74,7 +74,10 @@ def run(options: argparse.Namespace) -> int:
     scenario = options.scenario
     load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
     rows = plan.entries(options.rows or tuple(plan.ROWS), vehicle)
-    rows |= (_further(text, vehicle) for text in options.profile)
+    for text in options.profile:
+        label, profile = _further(text, vehicle)
+        if rows.setdefault(label, profile) is not profile:
+            raise ConfigurationError(f"--profile {text}: the row {label} is there already")
     effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)

@@ -26,7 +26,7 @@ TABLE1, TABLE1_FLOWN = "paper_table1", "paper_table1_as_flown"  # profiles
 
 # Row names of the command line → labels: baselines, proposed law, variants of the proposed law.
 ROWS = {
-    **{name: law.label for name, law in catalogue.LAWS.items() if name != catalogue.DEFAULT},
+    **{name: catalogue.label(name) for name in catalogue.LAWS if name != catalogue.DEFAULT},
     "proposed": PROPOSED,
     "frozen": FROZEN,
     **{f"frozen_{name}": f"proposed, {name} frozen" for name in SUBSYSTEMS},
