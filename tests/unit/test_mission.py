@@ -337,8 +337,11 @@ def test_a_landing_that_the_pilot_ended_does_not_pull_the_vehicle_down():
     flight.authority = Authority()
     for _ in range(300):
         output = flight.step()
-    assert output.state is State.HOLDING
+    assert output.state is State.HOLDING and output.abort_reason == "land by command"
     assert output.reference[0, 2] == pytest.approx(1.5, abs=0.05)
+    assert flight.mission.request(OperatorCommand.RESUME)[0]
+    output = flight.until(lambda o: o.done, limit=200.0)
+    assert output.phase == "landed" and not output.abort_reason  # the scenario was flown
 
 
 def test_the_magnet_of_a_released_vehicle_follows_the_policy():

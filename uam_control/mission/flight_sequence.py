@@ -406,7 +406,7 @@ class FlightSequence:
         planned = decision.guide is Guide.SCENARIO or event is Event.TOUCHDOWN
         waits = state in STOPPED_STATES
         self._fell_since = math.inf
-        if before is State.FAILSAFE and event is Event.AGREES:
+        if event is Event.RESUME or (before is State.FAILSAFE and event is Event.AGREES):
             self.output.abort_reason = ""
         elif not waits and not planned and before is not State.FAILSAFE:
             reasons = (self.output.abort_reason, decision.cause)

@@ -72,13 +72,8 @@ class References:
         rows = self.samples.rows
         flights = np.flatnonzero(rows[:, -1])
         if len(flights):
-            pose = _of_pose(size)
+            pose = [c for c in range(3 * size) if c % size < ALPHA]
             rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
-
-
-def _of_pose(size: int) -> np.ndarray:
-    """Return the numbers of the base's columns among those of a state or reference."""
-    return np.flatnonzero(np.arange(3 * size) % size < ALPHA)
 
 
 def read_flight(
@@ -150,8 +145,8 @@ def read_flight(
             name, len(recording.phase_names)
         )
     released = np.flatnonzero(recording.phases == recording.phase_names.get(RELEASED, -1))
-    pose = _of_pose(columns.size)  # the mission's follows the vehicle, and is not published
-    to, of = (columns.block(name).start + pose for name in ("reference.", "estimate."))
+    # the mission's reference follows the vehicle then, and is not published
+    to, of = (columns.block(name).start + np.arange(ALPHA) for name in ("reference.", "estimate."))
     values[np.ix_(released, to)] = values[np.ix_(released, of)]
     recording.count = len(ticks)
     faults = fault_records(log.diagnostics(topics.FAULTS, FaultEvent.from_message), takeoff)
