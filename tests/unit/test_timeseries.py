@@ -98,3 +98,12 @@ def test_a_file_that_is_no_flight_is_refused_in_one_line(tmp_path):
     pq.write_table(table, tmp_path / "y.parquet")
     with pytest.raises(UnreadableFlight, match=r"column 'tau_p.x \[N\]' missing"):
         timeseries.read(tmp_path / "y.parquet")
+
+
+def test_a_flight_from_before_a_law_was_added_has_unknown_gains_of_it(tmp_path):
+    made = recording(["hover"])
+    made.values[0, COLUMNS["adaptation.arm.K1"]] = 2.0
+    label = "adaptation.position.K0 [1]"
+    pq.write_table(made.series().table().drop_columns([label]), tmp_path / "y.parquet")
+    back = timeseries.read(tmp_path / "y.parquet")
+    assert np.isnan(back["adaptation.position.K0"]).all() and back["adaptation.arm.K1"][0] == 2.0

@@ -54,6 +54,7 @@ def of_the_hand(
 
 
 SUBSYSTEMS = ("position", "attitude", "arm")
+GAINS = "adaptation."  # begin of their columns' names
 AXES = 3  # the largest number of axes of a subsystem
 # Phases of the mission node on the ground; the scenario names those in flight.
 ON_GROUND = ("waiting", "touchdown", "landed", "aborted")
@@ -80,7 +81,7 @@ def _declare(joints: int, rotors: int, hand: bool, fingers: bool) -> dict[str, s
     # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
     # per column would mislead.
     gains = catalogue.gain_names(max(AXES, joints))
-    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in gains}
+    columns |= {f"{GAINS}{s}.{gain}": "1" for s in SUBSYSTEMS for gain in gains}
     columns |= {f"rotor_{i}.command": "1" for i in range(1, rotors + 1)}
     columns |= {f"rotor_{i}.thrust": "N" for i in range(1, rotors + 1)}
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
@@ -152,7 +153,7 @@ def columns_of(vehicle: VehicleDescription) -> Columns:
 
 def gain_columns(subsystem: str, names: Iterable[str], found: Columns) -> np.ndarray:
     """Return the column numbers (n,) of a subsystem's gains `names` among the columns `found`."""
-    return np.array([found[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
+    return np.array([found[f"{GAINS}{subsystem}.{name}"] for name in names], dtype=int)
 
 
 class UnreadableFlight(ValueError):
@@ -324,7 +325,9 @@ def read(path: Path) -> Series:
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise UnreadableFlight(f"{path}: column {missing[0]!r}{more} missing")
-    values = np.column_stack([table[found.label(name)].to_numpy() for name in found.names])
+    labels, nothing = map(found.label, found.names), np.full(len(table), np.nan)
+    known = (table[one].to_numpy() if one in table.column_names else nothing for one in labels)
+    values = np.column_stack(list(known))
     phase = table[PHASE_COLUMN].combine_chunks().dictionary_encode()
     if isinstance(phase, pa.ChunkedArray):
         phase = phase.combine_chunks()
@@ -343,7 +346,8 @@ def _layout(present: Iterable[str]) -> Columns:
 
 
 def _missing(present: Iterable[str], columns: Columns) -> list[str]:
-    """Return the labels of the required columns that are not in `present`."""
-    present = set(present)
-    required = [columns.label(name) for name in columns.names] + [PHASE_COLUMN]
+    """Return the labels of the required columns that are not in `present`: all but the gains, as
+    there may be other laws now than there were."""
+    present, names = set(present), columns.names
+    required = [columns.label(one) for one in names if not one.startswith(GAINS)] + [PHASE_COLUMN]
     return [label for label in required if label not in present]
