@@ -72,5 +72,5 @@ def test_a_folder_without_flight_is_refused_in_one_line(tmp_path, capsys):
     assert main.main(["report", str(tmp_path)]) == 2
     shutil.rmtree(tmp_path)
     message = capsys.readouterr().err.splitlines()
-    assert message[0].endswith("has no log.mcap for a report")
+    assert message[0].endswith("has neither log.mcap nor metrics.json for a report")
     assert message[1].endswith("is not an MCAP file")

@@ -253,7 +253,12 @@ def test_a_missing_info_is_no_error_and_a_damaged_file_is_one_line(
     command = ["report", str(flight_folder), "--no-pictures"]
     (flight_folder / "info.json").unlink()
     assert main(command) == 0
+    table, aside = flight_folder / "timeseries.parquet", flight_folder / "aside"
+    table.rename(aside)
     capsys.readouterr()
+    assert main(command) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == f"uam report: {table} does not exist"
+    aside.rename(table)
     file = flight_folder / "metrics.json"
     for text, complaint in (
         ("{", "not valid JSON"),
@@ -282,7 +287,8 @@ def test_the_report_of_a_flight_without_a_log_in_another_folder(
 
 def test_the_log_stands_for_its_folder(tmp_path, capsys):
     assert main(["report", str(tmp_path / "log.mcap")]) == 2
-    assert capsys.readouterr().err == f"uam report: {tmp_path} has no log.mcap for a report\n"
+    complaint = f"{tmp_path} has neither log.mcap nor metrics.json for a report"
+    assert capsys.readouterr().err == f"uam report: {complaint}\n"
 
 
 def test_outcomes_in_words():

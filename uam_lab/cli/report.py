@@ -59,10 +59,11 @@ def one(options: argparse.Namespace) -> int:
         metrics = read_json(directory / "metrics.json")
         if missing := [name for name in SHOWN if name not in metrics]:
             raise ResultFolderError(f"{directory / 'metrics.json'}: {missing[0]} is missing")
+        make_folder(out, shared=True)
         if out.resolve() != directory.resolve():
             copy_flight(directory, out)
     else:
-        raise ResultFolderError(f"{directory} has no {LOG} for a report")
+        raise ResultFolderError(f"{directory} has neither {LOG} nor metrics.json for a report")
     console = Terminal()
     with reporting(console) as show:
         report = build_report(

@@ -66,7 +66,6 @@ def copy_flight(directory: Path, out: Path) -> None:
     Raises ResultFolderError if `out` contains a flight; OSError.
     """
     ResultFolder(out).refuse_flight()
-    make_folder(out, shared=True)
     for name in (TABLE, "metrics.json", "info.json", *FILES):
         if (directory / name).exists():
             copy(directory / name, out / name)

@@ -317,6 +317,8 @@ def read(path: Path) -> Series:
     """
     try:
         table = pq.read_table(path)
+    except FileNotFoundError:
+        raise UnreadableFlight(f"{path} does not exist") from None
     except (OSError, pa.ArrowException) as error:
         reason = str(error).splitlines()[0]
         raise UnreadableFlight(f"{path}: not a readable flight ({reason})") from None
