@@ -12,6 +12,7 @@ from uam_control.coordinates import ARM
 from uam_control.maths.kept_tuple import compiled_hook, table
 from uam_control.stages.control_tick import STAGES
 from uam_control.stages.step import DONE, chain
+from uam_control.stamps import SECOND
 
 
 def test_the_stages_are_those_of_the_block_diagram():
@@ -194,3 +195,12 @@ def test_in_the_hands_of_a_person_the_commands_are_computed_and_not_sent():
         setpoint = bridge.tick(rig.stamp, *inputs, *desired)
         assert setpoint.thrust > 0.0 and setpoint.rates[0] < 0.0
         assert (rig.port.setpoints[-1][1].thrust > 0.0) is sent_thrust
+
+
+def test_a_new_bridge_obeys_no_resume_of_before():
+    bridge, asked = Rig().control.bridge, []
+    bridge.sequence.regain = asked.append
+    for at, regains in ((1, 1), (2, 1), (3, 2)):
+        bridge.mission(at * SECOND, False, False, regains)
+        bridge.hear(at * SECOND + PERIOD * 5)
+    assert asked == [3.0]

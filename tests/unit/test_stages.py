@@ -221,6 +221,20 @@ def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
     assert not checks["control"].passed and checks["control"].value == "the pilot, in HOLD"
 
 
+def test_a_new_bridge_that_has_not_heard_the_autopilot_says_nothing_of_its_motors():
+    stage, state = mission_stage(), np.zeros((3, 8))
+    armed = AutopilotReport(True, Mode.OFFBOARD, True, Phase.FLYING, (), armed_since=0)
+    stage.autopilot(0, armed)
+    stage.begin(PERIOD, state)
+    stage.advance(PERIOD, state)
+    unheard = AutopilotReport(False, Mode.UNKNOWN, False, Phase.WAITING, ())
+    for report, expected in ((unheard, True), (armed._replace(armed=False), False)):
+        stage.autopilot(PERIOD, report)
+        stage.begin(2 * PERIOD, state)
+        stage.advance(2 * PERIOD, state)
+        assert stage.mission._seen.armed is expected
+
+
 class Joined:
     """A joined autopilot at rest, tick by tick, poses coming in."""
 

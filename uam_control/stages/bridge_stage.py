@@ -131,7 +131,7 @@ class BridgeStage:
         self._hold, self.kept = new_hold(sets.setpoint.setpoint_rate), None
         self.reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
-        self._regains = 0
+        self._regains = -1  # those of the first status were commanded before this began
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None  # of the autopilot, due after the last tick
         self.hands = False
@@ -176,7 +176,7 @@ class BridgeStage:
         self.sequence.begin(stamp / SECOND, self.autopilot.loss_time, late)
         while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
             commanded, self.sequence.let_go, regains = self._orders.popleft()
-            if regains > self._regains:
+            if regains > self._regains >= 0:
                 self.sequence.regain(commanded / SECOND)
             self._regains = regains
         sequence = self.sequence

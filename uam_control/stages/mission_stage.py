@@ -86,9 +86,9 @@ class MissionStage:
         while self._reports and self._reports[0][0] < stamp:
             reported, r = self._reports.popleft()
             self._authority = Authority(r.released_to, r.landed, r.lands, r.failed, r.stopped)
-            armed = r.armed and r.armed_since is not None
-            self._armed_since = r.armed_since / SECOND if armed else None
-            if r.connected:
+            if r.connected:  # else a new bridge may not have heard of it yet
+                armed = r.armed and r.armed_since is not None
+                self._armed_since = r.armed_since / SECOND if armed else None
                 delays = (r.round_trip, r.loop_delay)
                 known = (math.nan if one is None else one for one in delays)
                 self.inputs.inputs.autopilot(reported / SECOND, *known)
