@@ -424,6 +424,6 @@ def test_return_that_has_begun_to_land_goes_on_beside_its_home():
         (Mode.RETURN, 0.5),
     ]:
         place[POSITION] = north, 0.0, -1.0
-        modes.update(mode, place, 0.004, 0.5)
+        modes.fly(mode, place, 0.004, 0.5)
         sinks.append(modes.sinking)
     assert sinks == [False, True, True, False, False]

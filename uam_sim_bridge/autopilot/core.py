@@ -310,7 +310,7 @@ class Autopilot:
             return np.zeros(4), False
         if mode in MODES and aided:
             modes = self._position_modes
-            setpoint = modes.update(mode, self.estimator.estimate, dt, self._hover)
+            setpoint = modes.fly(mode, self.estimator.estimate, dt, self._hover)
             if self.landing.landed and not modes.climbing:  # PX4 idles until it takes off
                 modes.reset()
                 setpoint[:] = 0.0

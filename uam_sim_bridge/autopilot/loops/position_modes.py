@@ -1,8 +1,4 @@
-"""PX4's position cascade (v1.16): in HOLD, POSITION (sticks) and RETURN, and in OFFBOARD.
-
-position → velocity (P), velocity → acceleration (PI), acceleration → thrust direction and thrust →
-attitude loop. The first three are the flight of a pilot or of a failsafe: simple and slow. In
-OFFBOARD:
+"""PX4's position cascade (v1.16): in OFFBOARD, and in HOLD, POSITION (sticks) and RETURN.
 
     v_sp = v_ff + P_p (p_sp - p), limited;   a_sp = a_ff + P_v (v_sp - v) + integral - D_v dv/dt
     thrust direction from the horizontal acceleration and gravity, limited tilt
@@ -11,8 +7,8 @@ OFFBOARD:
 With MPC_ACC_DECOUPLE 1, the default, the vertical acceleration does not change the tilt. The
 integral stops vertically while the thrust saturates, and horizontally by tracking (arw_gain). PX4
 runs this loop at the rate of its estimate, some 100 Hz, and estimates the hover thrust for it
-(MPC_USE_HTE), here for the other modes only; it runs at each sample, with MPC_THR_HOVER. All
-vectors are NED.
+(MPC_USE_HTE), here for the other modes only; it runs at each sample, in OFFBOARD with
+MPC_THR_HOVER. The other modes are those of a pilot or of a failsafe, and slow. All vectors are NED.
 """
 
 import math
@@ -30,16 +26,18 @@ MODES = (Mode.HOLD, Mode.POSITION, Mode.RETURN)
 _STICK_ZERO = 0.1  # stick deflection that counts as none (PX4: MPC_HOLD_DZ)
 _AT_HOME = 0.3  # m, horizontal distance from which RETURN descends
 _BRAKING = 0.5  # s, the held position lies this far ahead of a moving vehicle
-_INTEGRAL = 2.0 * GRAVITY  # m/s^2, limit of the velocity integral
-_LEAST_LIFT = 0.3 * GRAVITY  # m/s^2, smallest upward part of the thrust
 
 
-class Cascade:
-    """`setpoint` (4,): body rates [rad/s, FRD], thrust; call `reset` while another mode flies."""
+class PositionControl:
+    """The cascade of OFFBOARD; call `reset` while another mode flies."""
+
+    SPEEDS = ("MPC_XY_VEL_MAX", "MPC_Z_VEL_MAX_UP", "MPC_Z_VEL_MAX_DN")  # across, up, down
 
     def __init__(self, parameters: Parameters) -> None:
-        self.setpoint = np.zeros(4)
+        self.setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
         self._integral = np.zeros(3)  # [m/s^2]
+        self._velocity: np.ndarray | None = None  # of the last cycle
+        self._slope = np.zeros(3)  # [m/s^2] low-pass filtered derivative of the velocity
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
@@ -47,15 +45,8 @@ class Cascade:
         self._position_gain = _gains(p, "P")
         self._p, self._i, self._d = (_gains(p, f"VEL_{kind}_ACC") for kind in "PID")
         self._attitude_gains = attitude_gains(p)
-
-
-class PositionControl(Cascade):
-    """The cascade of OFFBOARD."""
-
-    def __init__(self, parameters: Parameters) -> None:
-        super().__init__(parameters)
-        self._velocity: np.ndarray | None = None  # of the last cycle
-        self._slope = np.zeros(3)  # [m/s^2] low-pass filtered derivative of the velocity
+        self._across, self._up, self._down = p.vector(*self.SPEEDS)
+        self._hover = p["MPC_THR_HOVER"]
 
     def reset(self) -> None:
         if self._velocity is not None:
@@ -68,8 +59,8 @@ class PositionControl(Cascade):
         self._differentiate(velocity, dt)
         back = self._position_gain * (target.position - position)
         desired = back + target.velocity
-        limit_across(back, target.velocity, p["MPC_XY_VEL_MAX"], desired)
-        desired[2] = min(p["MPC_Z_VEL_MAX_DN"], max(-p["MPC_Z_VEL_MAX_UP"], desired[2]))
+        limit_across(back, target.velocity, self._across, desired)
+        desired[2] = min(self._down, max(-self._up, desired[2]))
         error = desired - velocity
         self._integral[2] = min(GRAVITY, max(-GRAVITY, self._integral[2]))
         acceleration = (
@@ -86,7 +77,7 @@ class PositionControl(Cascade):
         allowed = math.sqrt(max(0.0, most * most - thrust[2] * thrust[2]))
         if across > allowed:
             thrust[:2] *= allowed / across
-        produced = thrust[:2] * GRAVITY / p["MPC_THR_HOVER"]
+        produced = thrust[:2] * GRAVITY / self._hover
         if acceleration[0] ** 2 + acceleration[1] ** 2 > produced[0] ** 2 + produced[1] ** 2:
             error[:2] -= 2.0 / self._p[0] * (acceleration[:2] - produced)
         self._integral += self._i * error * dt
@@ -120,8 +111,7 @@ class PositionControl(Cascade):
         if math.atan2(across, axis[2]) > tilt:
             axis[:2] *= math.sin(tilt) / across
             axis[2] = math.cos(tilt)
-        hover = p["MPC_THR_HOVER"]
-        vertical = acceleration[2] * hover / GRAVITY - hover
+        vertical = acceleration[2] * self._hover / GRAVITY - self._hover
         return axis, axis * min(vertical / axis[2], -p["MPC_THR_MIN"])
 
 
@@ -159,11 +149,13 @@ def attitude_of(axis: np.ndarray, yaw: float) -> np.ndarray:
     return quaternion_from_euler(np.array([roll, math.atan2(forward, axis[2]), yaw]))
 
 
-class PositionModes(Cascade):
-    """The cascade of the modes without a companion.
+class PositionModes(PositionControl):
+    """The cascade of the modes without a companion, with lower speeds.
 
     `sinking`, `climbing`: whether the last setpoint descends to the ground, or climbs by the stick.
     """
+
+    SPEEDS = ("MPC_VEL_MANUAL", "MPC_LAND_SPEED", "MPC_LAND_SPEED")
 
     def __init__(self, parameters: Parameters) -> None:
         super().__init__(parameters)
@@ -175,66 +167,37 @@ class PositionModes(Cascade):
         self._yaw = 0.0
 
     def reset(self) -> None:
+        super().reset()
         self._mode, self.sinking = None, False
 
-    def update(self, mode: Mode, estimate: np.ndarray, dt: float, hover: float) -> np.ndarray:
-        """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
-
-        estimate (10,): of `Estimator`; dt [s]; hover: thrust of hover, as estimated.
-        """
-        position, velocity = estimate[POSITION], estimate[VELOCITY]
+    def fly(self, mode: Mode, estimate: np.ndarray, dt: float, hover: float) -> np.ndarray:
+        """Return as `update`; hover: thrust of hover, as estimated."""
+        position = estimate[POSITION]
         if mode is not self._mode:
-            self._mode, self._held = mode, position + _BRAKING * velocity
+            self.reset()
+            self._mode, self._held = mode, position + _BRAKING * estimate[VELOCITY]
             self._yaw = float(euler_from_quaternion(estimate[ATTITUDE])[2])
-            self._integral[:], self.sinking = 0.0, False
-        desired = self._desired_velocity(mode, position, dt)
-        error = desired - velocity
-        self._integral += self._i * error * dt
-        np.clip(self._integral, -_INTEGRAL, _INTEGRAL, out=self._integral)
-        acceleration = self._p * error + self._integral
-        return self._attitude(estimate, acceleration, hover)
+        self._hover = hover
+        velocity = self._desired_velocity(mode, position, dt)
+        self._held = np.where(velocity == 0.0, self._held, position)
+        target = PositionTarget(0, self._held, velocity, np.zeros(3), self._yaw, 0.0)
+        return self.update(target, estimate, dt)
 
     def _desired_velocity(self, mode: Mode, position: np.ndarray, dt: float) -> np.ndarray:
-        """Return the desired velocity (3,) [m/s, NED]; moves the held position."""
-        p, lands, self.sinking, self.climbing = self._parameters, self.sinking, False, False
-        speed, vertical = p["MPC_VEL_MANUAL"], np.zeros(3)
+        """Return the desired velocity (3,) [m/s, NED], 0 along an axis whose position is held."""
+        lands, self.sinking, self.climbing = self.sinking, False, False
+        velocity = np.zeros(3)
         if mode is Mode.RETURN:
-            away = self.home[:2] - position[:2]
             self._held[:2] = self.home[:2]
-            self.sinking = lands or math.hypot(*away) < _AT_HOME  # the ground may push it off
-        moving = np.zeros(3)
+            away = math.hypot(*(self.home[:2] - position[:2]))
+            self.sinking = lands or away < _AT_HOME  # the ground may push it off
+            velocity[2] = self._down if self.sinking else 0.0
         if mode is Mode.POSITION:
             sticks = np.where(np.abs(self.sticks) > _STICK_ZERO, self.sticks, 0.0)
             cosine, sine = math.cos(self._yaw), math.sin(self._yaw)
-            forward, right = speed * sticks[:2]
-            moving[:2] = cosine * forward - sine * right, sine * forward + cosine * right
-            moving[2] = -p["MPC_LAND_SPEED"] * sticks[2]
+            forward, right = self._across * sticks[:2]
+            velocity[:2] = cosine * forward - sine * right, sine * forward + cosine * right
+            velocity[2] = -self._up * sticks[2]
             self.sinking, self.climbing = bool(sticks[2] < 0.0), bool(sticks[2] > 0.0)
-            self._yaw += math.radians(p["MPC_MAN_Y_MAX"]) * sticks[3] * dt
-        if self.sinking and mode is Mode.RETURN:
-            vertical[2] = p["MPC_LAND_SPEED"]
-        fixed = moving == 0.0
-        self._held = np.where(fixed, self._held, position)
-        if self.sinking:
-            self._held[2] = position[2]
-        back = self._position_gain * (self._held - position)
-        across = math.hypot(back[0], back[1])
-        if across > speed:
-            back[:2] *= speed / across
-        back[2] = min(p["MPC_LAND_SPEED"], max(-p["MPC_LAND_SPEED"], back[2]))
-        return np.where(fixed, back, moving) + vertical
-
-    def _attitude(self, estimate: np.ndarray, acceleration: np.ndarray, hover: float) -> np.ndarray:
-        """Return the setpoint (4,) for an acceleration (3,) [m/s^2, NED]."""
-        p = self._parameters
-        lift = max(_LEAST_LIFT, GRAVITY - acceleration[2])
-        limit = lift * math.tan(math.radians(p["MPC_TILTMAX_AIR"]))
-        across = math.hypot(acceleration[0], acceleration[1])
-        scale = min(1.0, limit / across) if across > 0.0 else 1.0
-        axis = np.array([-scale * acceleration[0], -scale * acceleration[1], lift])
-        size = math.sqrt(float(axis @ axis))
-        desired = attitude_of(axis / size, self._yaw)
-        attitude_rates(estimate[ATTITUDE], desired, 0.0, self._attitude_gains, self.setpoint)
-        thrust = hover * size / GRAVITY
-        self.setpoint[3] = min(p["MPC_THR_MAX"], max(p["MPC_THR_MIN"], thrust))
-        return self.setpoint
+            self._yaw += math.radians(self._parameters["MPC_MAN_Y_MAX"]) * sticks[3] * dt
+        return velocity
