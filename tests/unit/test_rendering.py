@@ -30,11 +30,11 @@ def test_a_pose_reproduces_the_recorded_positions(flight):
     poses = Poses(flight)
     row = flight.row_at(50.0)
     poses.put(row)
-    np.testing.assert_allclose(poses.body("base"), flight.block("truth.")[row, :3])
-    np.testing.assert_allclose(poses.body("payload"), flight.block("payload.")[row, :3])
+    np.testing.assert_allclose(poses.data.body("base").xpos, flight.block("truth.")[row, :3])
+    np.testing.assert_allclose(poses.data.body("payload").xpos, flight.block("payload.")[row, :3])
     chi = flight.block("truth.")[row].copy()
     # link 1 by hand, at the recorded attitude: 0.1 m at alpha_1 from straight down
-    link_2 = poses.body("link_2") - poses.body("link_1")
+    link_2 = poses.data.body("link_2").xpos - poses.data.body("link_1").xpos
     assert np.linalg.norm(link_2) == pytest.approx(0.1)
     down = np.array([np.sin(chi[6] - chi[4]), 0.0, -np.cos(chi[6] - chi[4])])
     np.testing.assert_allclose(link_2 / 0.1, down, atol=0.03)
@@ -44,7 +44,7 @@ def test_without_payload_its_body_is_out_of_sight(flight):
     info = flight.info | {"payload_mass_kg": 0.0}
     poses = Poses(Series(flight.values, flight.phases, flight.phase_names, info, flight.columns))
     poses.put(flight.row_at(50.0))
-    assert np.linalg.norm(poses.body("payload")) > 20.0
+    assert np.linalg.norm(poses.data.body("payload").xpos) > 20.0
 
 
 def test_snapshots_are_those_of_the_scenario_up_to_the_end_of_the_flight(flight):

@@ -1,6 +1,5 @@
 """Masses, shapes and places of the links, from the model of the file."""
 
-import itertools
 import math
 
 import mujoco
@@ -8,6 +7,7 @@ import numpy as np
 
 from uam_lab.importing.source import LARGE, ImportRefused
 from uam_lab.importing.structure import Parts
+from uam_sim_bridge.plant.arm_geometry import outline
 
 LEAST_MASS = 1e-6  # [kg]
 LEAST_INERTIA = 1e-9  # [kg m^2]
@@ -15,8 +15,6 @@ FARTHEST, HEAVIEST = 5.0, 100.0  # [m] of a rotor, radius of gyration; [kg] of a
 HINGE_DEG = 140.0  # of the magnet's hinge from the last link: 10 less than in parts/magnet.xml
 ALONG = 1e-6  # of an axis that counts as upright or forward
 SHORT = 0.01  # [m] tip from the last joint
-DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
-DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 SHAPES = mujoco.mjtGeom
 
 
@@ -56,31 +54,6 @@ def shapes(parts: Parts, link: int, colliding: bool) -> list[int]:
     own = np.isin(model.geom_bodyid, parts.bodies(link))
     flat = np.isin(model.geom_type, (SHAPES.mjGEOM_PLANE, SHAPES.mjGEOM_HFIELD))
     return np.flatnonzero(own & ~flat & (touch == colliding)).tolist()
-
-
-def outline(parts: Parts, geom: int, exact: bool = True) -> np.ndarray:
-    """Return points (m, 3) [m] on the outside of a shape, in the file's world.
-
-    exact: with the vertices of a mesh, else with its box.
-    """
-    model, data = parts.model, parts.data
-    size, kind = model.geom_size[geom], model.geom_type[geom]
-    if kind == SHAPES.mjGEOM_SPHERE:
-        local = size[0] * DIRECTIONS
-    elif kind in (SHAPES.mjGEOM_CAPSULE, SHAPES.mjGEOM_CYLINDER):
-        ends = np.array([[0, 0, size[1]], [0, 0, -size[1]]])
-        round_ = DIRECTIONS if kind == SHAPES.mjGEOM_CAPSULE else DIRECTIONS * (1, 1, 0)
-        norm = np.maximum(np.linalg.norm(round_, axis=1), 1e-9)[:, None]
-        local = (ends[:, None] + size[0] * (round_ / norm)[None]).reshape(-1, 3)
-    elif kind == SHAPES.mjGEOM_ELLIPSOID:
-        local = size * DIRECTIONS
-    elif kind == SHAPES.mjGEOM_MESH and exact:
-        mesh = model.mesh(model.geom_dataid[geom])
-        local = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
-    else:
-        box = model.geom_aabb[geom]
-        local = box[:3] + box[3:] * np.array(list(itertools.product((-1, 1), repeat=3)))
-    return data.geom_xpos[geom] + local @ data.geom_xmat[geom].reshape(3, 3).T
 
 
 def tip(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
@@ -133,7 +106,9 @@ def _far_end(parts: Parts) -> np.ndarray:
         raise parts.source.error("joint", name, text)
     along = centre / np.linalg.norm(centre)
     geoms = shapes(parts, link, True) + shapes(parts, link, False)
-    reach = [float(((outline(parts, g) - origin) @ axes @ along).max()) for g in geoms]
+    reach = [
+        float(((outline(parts.model, parts.data, g) - origin) @ axes @ along).max()) for g in geoms
+    ]
     return max([*reach, 2.0 * float(np.linalg.norm(centre))]) * along
 
 

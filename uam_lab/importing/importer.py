@@ -19,6 +19,7 @@ from uam_lab.importing.source import ImportRefused, Source, kind_of, tree
 from uam_lab.importing.standing import Stance, stand
 from uam_lab.importing.structure import BASE, Chosen, Parts, find
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.arm_geometry import outline
 
 SMALL = ("sensors", "variation", "air")  # whose assumptions stand in the YAML file alone
 READERS = {"robot": urdf_file.read, "mujoco": mjcf_file.read}
@@ -213,7 +214,7 @@ def _underside(parts: Parts) -> np.ndarray:
     geoms = geometry.shapes(parts, 0, True) + geometry.shapes(parts, 0, False)
     if not geoms:
         return centre
-    points = [(geometry.outline(parts, g) - origin) @ axes for g in geoms]
+    points = [(outline(parts.model, parts.data, g) - origin) @ axes for g in geoms]
     near = [p[np.linalg.norm(p[:, :2] - centre[:2], axis=1) < BELOW] for p in points]
     low = min((float(p[:, 2].min()) for p in near if len(p)), default=float(centre[2]))
     return np.array([centre[0], centre[1], low + TOP])

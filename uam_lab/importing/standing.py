@@ -9,6 +9,7 @@ import numpy as np
 from uam_lab.importing import geometry
 from uam_lab.importing.answers import ASSUMED, DERIVED, FILE, Answers, Told
 from uam_lab.importing.structure import Parts
+from uam_sim_bridge.plant.arm_geometry import outline
 
 DEGREES = 4.0 * math.pi, 720.0  # [rad] a limit in between is one in degrees
 LEAST = 0.2  # [rad] smallest range of a joint, see `loading.LEAST_RANGE`
@@ -83,7 +84,7 @@ def _feet(parts: Parts) -> tuple[np.ndarray | None, float]:
     geoms = geometry.shapes(parts, 0, True) or geometry.shapes(parts, 0, False)
     if not geoms:
         return None, 0.0
-    points = np.vstack([_in_base(parts, geometry.outline(parts, g)) for g in geoms])
+    points = np.vstack([_in_base(parts, outline(parts.model, parts.data, g)) for g in geoms])
     low = float(points[:, 2].min())
     on_ground = points[points[:, 2] < low + LOW]
     first, last = on_ground.min(axis=0)[:2], on_ground.max(axis=0)[:2]
@@ -145,7 +146,7 @@ def _boxes(parts: Parts) -> list[tuple[int, np.ndarray]]:
         geoms = geometry.shapes(parts, link, True) or geometry.shapes(parts, link, False)
         for geom in geoms:
             body = int(parts.model.geom_bodyid[geom])
-            points = geometry.outline(parts, geom, exact=False) - parts.data.xpos[body]
+            points = outline(parts.model, parts.data, geom, exact=False) - parts.data.xpos[body]
             found.append((body, points @ parts.data.xmat[body].reshape(3, 3)))
     return found
 

@@ -1,8 +1,9 @@
-"""Where the arm of the plant's model is: its lowest point on the ground.
+"""Where the arm of the plant's model is: its lowest point on the ground. Outlines of shapes.
 
 Read from the compiled model, so that any form of MJCF counts.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -13,6 +14,9 @@ BASE, FACE = "base", "magnet_face"  # body and site of the MJCF
 MAGNET, END_EFFECTOR = "magnet", "end_effector"  # body of a magnet, site of an arm without one
 SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 NO_LENGTH = 1e-9  # [m]
+SHAPES = mujoco.mjtGeom
+DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
 def room_below(
@@ -60,6 +64,36 @@ def has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
     return mujoco.mj_name2id(model, kind, name) >= 0
 
 
+def outline(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, exact: bool = True
+) -> np.ndarray:
+    """Return points (m, 3) [m] on the outside of a shape, in the world.
+
+    exact: with the vertices of a mesh, else with its box.
+    """
+    size, kind = model.geom_size[geom], model.geom_type[geom]
+    if kind == SHAPES.mjGEOM_SPHERE:
+        local = size[0] * DIRECTIONS
+    elif kind in (SHAPES.mjGEOM_CAPSULE, SHAPES.mjGEOM_CYLINDER):
+        ends = np.array([[0, 0, size[1]], [0, 0, -size[1]]])
+        round_ = DIRECTIONS if kind == SHAPES.mjGEOM_CAPSULE else DIRECTIONS * (1, 1, 0)
+        norm = np.maximum(np.linalg.norm(round_, axis=1), 1e-9)[:, None]
+        local = (ends[:, None] + size[0] * (round_ / norm)[None]).reshape(-1, 3)
+    elif kind == SHAPES.mjGEOM_ELLIPSOID:
+        local = size * DIRECTIONS
+    elif kind == SHAPES.mjGEOM_MESH and exact:
+        local = _vertices(model, geom)
+    else:
+        box = model.geom_aabb[geom]
+        local = box[:3] + box[3:] * np.array(list(itertools.product((-1, 1), repeat=3)))
+    return data.geom_xpos[geom] + local @ data.geom_xmat[geom].reshape(3, 3).T
+
+
+def _vertices(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    mesh = model.mesh(model.geom_dataid[geom])
+    return model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
+
+
 def _posed(model: mujoco.MjModel, joints: Sequence[str], angles: Sequence[float]) -> mujoco.MjData:
     """Return the data of a level base at the origin, with joint angles (n,) [rad]."""
     data = mujoco.MjData(model)
@@ -98,18 +132,15 @@ def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
     """Return the height [m] of a shape's lowest point; of its box, where the shape is unusual."""
     up = data.geom_xmat[geom].reshape(3, 3)[2]
     centre, size, kind = data.geom_xpos[geom][2], model.geom_size[geom], model.geom_type[geom]
-    shapes = mujoco.mjtGeom
-    if kind == shapes.mjGEOM_SPHERE:
+    if kind == SHAPES.mjGEOM_SPHERE:
         return float(centre - size[0])
-    if kind == shapes.mjGEOM_CAPSULE:
+    if kind == SHAPES.mjGEOM_CAPSULE:
         return float(centre - abs(up[2]) * size[1] - size[0])
-    if kind == shapes.mjGEOM_CYLINDER:
+    if kind == SHAPES.mjGEOM_CYLINDER:
         return float(centre - abs(up[2]) * size[1] - math.hypot(up[0], up[1]) * size[0])
-    if kind == shapes.mjGEOM_ELLIPSOID:
+    if kind == SHAPES.mjGEOM_ELLIPSOID:
         return float(centre - np.linalg.norm(up * size))
-    if kind == shapes.mjGEOM_MESH:
-        mesh = model.mesh(model.geom_dataid[geom])
-        points = model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
-        return float(centre + (points @ up).min())
+    if kind == SHAPES.mjGEOM_MESH:
+        return float(centre + (_vertices(model, geom) @ up).min())
     box = model.geom_aabb[geom]
     return float(centre + up @ box[:3] - np.abs(up) @ box[3:])

@@ -1,7 +1,6 @@
 """Side view of the mission: paths in the x-z plane with poses of vehicle and arm."""
 
-from collections.abc import Sequence
-from itertools import product
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -16,14 +15,15 @@ from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_lab.records.results.timeseries import Series
 from uam_lab.report.figures import style
 from uam_lab.report.figures.panels import DrawnFlight, corner_legend, flight_keys
+from uam_sim_bridge.plant.arm_geometry import outline
 from uam_sim_bridge.plant.gripper import FINGERS
 from uam_sim_bridge.plant.surroundings import PAYLOAD, PLACE
-from uam_sim_bridge.plant.vehicle import BASE, ENVIRONMENT, FACE, MAGNET, SWING, Vehicle
+from uam_sim_bridge.plant.vehicle import BASE, ENVIRONMENT, SWING, Vehicle
 
 POSES = 5
 DASHES = (0, (3, 2))  # of the reference
 TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
-FOOT = "foot_"  # beginning of the names of the landing gear's geoms
+HIDDEN = 3  # group of the first geoms that MuJoCo does not draw
 JOINT_WEIGHT = 0.2  # [m/rad] of the joints' motion in the distance between two poses
 REACH = 0.35  # [m] shown around the path, for rotors and arm
 OUT_OF_SIGHT = (50.0, 50.0, -1.0)
@@ -66,37 +66,16 @@ class Poses:
         qpos[self._payload : self._payload + 7] = payload
         mujoco.mj_kinematics(self.model, self.data)
 
-    @property
-    def outermost_rotors(self) -> tuple[str, str]:
-        """Names of the rearmost and the foremost rotor."""
-        rotors = self.vehicle.description.rotors
-        ends = (pick(rotors, key=lambda rotor: rotor.position[0]) for pick in (min, max))
-        return tuple(rotor.name for rotor in ends)
-
-    def arm(self) -> list[np.ndarray]:
-        """Return the world positions (3,) [m] of the joints, base to tip."""
-        names = self.vehicle.description.joint_names
-        return [self.data.joint(name).xanchor.copy() for name in names]
-
-    def geoms(self, beginning: str) -> np.ndarray:
-        """Return the world positions (m, 3) [m] of the geoms whose names begin so."""
-        names = [self.model.geom(i).name for i in range(self.model.ngeom)]
-        found = [i for i, name in enumerate(names) if name.startswith(beginning)]
-        return self.data.geom_xpos[found].copy()
-
-    def scenery(self) -> list[str]:
-        """Return the names of the geoms that stand around the vehicle."""
-        model, place = self.model, self.model.body(PLACE).id
-        above = model.body_parentid[model.geom_bodyid]
-        return [model.geom(i).name for i in np.flatnonzero(above == place)]
-
-    def body(self, name: str) -> np.ndarray:
-        """Return the world position (3,) [m] of a body's frame."""
-        return self.data.body(name).xpos.copy()
-
-    def site(self, name: str) -> np.ndarray:
-        """Return the world position (3,) [m] of a site."""
-        return self.data.site(name).xpos.copy()
+    def edges(self, root: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield the outline (m, 2) [m] in x and z, and the colour (4,), of each geom of the body
+        `root` and of those that it carries, the farthest first."""
+        model, data = self.model, self.data
+        own = model.body_rootid[model.geom_bodyid] == model.body(root).id
+        seen = np.flatnonzero(own & (model.geom_group < HIDDEN))
+        for geom in seen[np.argsort(-data.geom_xpos[seen, 1], kind="stable")]:
+            points, material = outline(model, data, geom)[:, [0, 2]], model.geom_matid[geom]
+            edge = points[ConvexHull(points, qhull_options="QJ").vertices]
+            yield edge, model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
 
 
 def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
@@ -191,59 +170,19 @@ def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
 
 
 def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
-    fade = {"alpha": opacity, "zorder": order, "solid_capstyle": "round"}
-    rotors = np.array([poses.site(name) for name in poses.outermost_rotors])
-    base = poses.body(BASE)
-    axis.plot(rotors[:, 0], rotors[:, 2], color=style.INK, linewidth=2.6, **fade)
-    for rotor in rotors:
-        half = 0.11
-        axis.plot(
-            [rotor[0] - half, rotor[0] + half],
-            [rotor[2] + 0.02] * 2,
-            color="#7fa6cf",
-            linewidth=1.6,
-            **fade,
-        )
-    feet = poses.geoms(FOOT)[:2]  # a front and a back one
-    if len(feet):
-        axis.plot(feet[:, 0], feet[:, 2], color=style.MUTED, linewidth=1.0, **fade)
-        middle = feet.mean(axis=0)
-        leg = ([base[0], middle[0]], [base[2], middle[2]])
-        axis.plot(*leg, color=style.MUTED, linewidth=1.0, **fade)
-    described = poses.vehicle.description
-    tip = [poses.body(MAGNET)] if described.has_magnet else []
-    face = FACE if described.has_magnet else described.end_effector
-    hand = [poses.site(face)] if face else []
-    chain = np.array([base, *poses.arm(), *tip, *hand])
-    axis.plot(chain[:, 0], chain[:, 2], color="#5b6670", linewidth=2.0, **fade)
-    axis.plot(
-        chain[1 : len(chain) - len(hand), 0],
-        chain[1 : len(chain) - len(hand), 2],
-        linestyle="none",
-        marker="o",
-        markersize=2.8,
-        color=style.DROP,
-        alpha=opacity,
-        zorder=order + 0.1,
-    )
+    """Draw vehicle and payload."""
+    _drawn(axis, poses, BASE, opacity, order)
     if poses.has_payload:
-        _boxed(axis, poses, "payload", style.PAYLOAD, opacity, order)
+        _drawn(axis, poses, PAYLOAD, opacity, order)
 
 
 def _scenery(axis: Axes, poses: Poses) -> None:
     poses.put(0)
     axis.axhline(0.0, color="#a7afb7", linewidth=1.0, zorder=1)
-    for geom in poses.scenery():
-        _boxed(axis, poses, geom, poses.model.geom(geom).rgba[:3], 1.0, 2)
+    _drawn(axis, poses, PLACE, 1.0, 2)
 
 
-def _boxed(
-    axis: Axes, poses: Poses, geom: str, colour: str | np.ndarray, opacity: float, order: int
-) -> None:
-    """Draw the outline of a geom's box, seen from the side."""
-    box, shape = poses.model.geom_aabb[poses.model.geom(geom).id], poses.data.geom(geom)
-    corners = box[:3] + box[3:] * np.array(list(product((-1.0, 1.0), repeat=3)))
-    seen = (shape.xpos + corners @ shape.xmat.reshape(3, 3).T)[:, [0, 2]]
-    outline = seen[ConvexHull(seen, qhull_options="QJ").vertices]
-    look = {"facecolor": colour, "edgecolor": "none", "alpha": opacity, "zorder": order}
-    axis.add_patch(Polygon(outline, **look))
+def _drawn(axis: Axes, poses: Poses, root: str, opacity: float, order: int) -> None:
+    for edge, colour in poses.edges(root):
+        look = {"facecolor": colour[:3], "edgecolor": style.INK, "linewidth": 0.4}
+        axis.add_patch(Polygon(edge, alpha=opacity, zorder=order, **look))
