@@ -38,8 +38,13 @@ from uam_sim_bridge.autopilot.cycle import (
     take_vision,
 )
 from uam_sim_bridge.autopilot.landing import LandDetector
-from uam_sim_bridge.autopilot.loops.attitude_control import Descent, attitude_gains, attitude_rates
-from uam_sim_bridge.autopilot.loops.position_modes import MODES, PositionControl, PositionModes
+from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
+from uam_sim_bridge.autopilot.loops.position_modes import (
+    MODES,
+    Descent,
+    PositionControl,
+    PositionModes,
+)
 from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
     TORQUE,
@@ -320,7 +325,7 @@ class Autopilot:
     def _descend(self, dt: float) -> np.ndarray:
         """Return the setpoint (4,) of the level descent."""
         known, contact = self._sink_known(self._time), self.landing.contact
-        return self._descent.update(self.estimator.estimate, dt, known, contact, self._hover)
+        return self._descent.fly(self.estimator.estimate, dt, known, contact, self._hover)
 
     def _sink_known(self, time: float) -> bool:
         return self.estimator.unaided_for(time) < self.parameters["EKF2_NOAID_TOUT"] * 1e-6

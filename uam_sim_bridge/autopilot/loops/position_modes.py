@@ -9,6 +9,11 @@ integral stops vertically while the thrust saturates, and horizontally by tracki
 runs this loop at the rate of its estimate, some 100 Hz, and estimates the hover thrust for it
 (MPC_USE_HTE), here for the other modes only; it runs at each sample, in OFFBOARD with
 MPC_THR_HOVER. The other modes are those of a pilot or of a failsafe, and slow. All vectors are NED.
+
+The descent of a failsafe (PX4's mode Descend) is level, with a constant sink speed. Without a valid
+vertical velocity the thrust is a bit below that of hover, as in PX4. PX4 keeps that thrust on the
+ground, too, and its land detector then needs the velocity that is missing. Here the thrust falls
+when every vehicle of a laboratory has come down, so that the landing is detected.
 """
 
 import math
@@ -18,7 +23,7 @@ import numpy as np
 from uam_control.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from uam_control.offboard.modes import Mode
 from uam_control.setpoints.targets import PositionTarget
-from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY, POSITION, VELOCITY
+from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, DOWN, GRAVITY, POSITION, VELOCITY
 from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.params import Parameters
 
@@ -26,6 +31,9 @@ MODES = (Mode.HOLD, Mode.POSITION, Mode.RETURN)
 _STICK_ZERO = 0.1  # stick deflection that counts as none (PX4: MPC_HOLD_DZ)
 _AT_HOME = 0.3  # m, horizontal distance from which RETURN descends
 _BRAKING = 0.5  # s, the held position lies this far ahead of a moving vehicle
+_BELOW_HOVER = 0.3  # m/s^2 down, without a valid vertical velocity (PX4)
+_DOWN_BY_NOW = 5.0  # s of such a descent, after which the thrust falls
+_FALLING = 1.0  # m/s^3, the fall of the thrust
 
 
 class PositionControl:
@@ -201,3 +209,37 @@ class PositionModes(PositionControl):
             self.sinking, self.climbing = bool(sticks[2] < 0.0), bool(sticks[2] > 0.0)
             self._yaw += math.radians(self._parameters["MPC_MAN_Y_MAX"]) * sticks[3] * dt
         return velocity
+
+
+class Descent(PositionControl):
+    """The cascade of the descent: what is across is not seen, so it stays level."""
+
+    SPEEDS = PositionModes.SPEEDS
+    _blind = 0.0  # s without a valid vertical velocity
+
+    def reset(self) -> None:
+        super().reset()
+        self._blind = 0.0
+
+    def fly(
+        self, estimate: np.ndarray, dt: float, sink_known: bool, contact: bool, hover: float
+    ) -> np.ndarray:
+        """Return as `update`; hover: thrust of hover, as estimated.
+
+        sink_known: the vertical velocity is valid; contact: the ground is touched, and the vehicle
+        only waits for the end of the flight, as in PX4.
+        """
+        self._hover = hover
+        velocity, acceleration, seen = np.zeros(3), np.zeros(3), estimate.copy()
+        seen[VELOCITY] = 0.0
+        if contact:
+            self.reset()
+            acceleration[2] = GRAVITY
+        elif sink_known:
+            velocity[2], seen[DOWN] = self._down, estimate[DOWN]
+        else:
+            self._blind += dt
+            acceleration[2] = _BELOW_HOVER + _FALLING * max(0.0, self._blind - _DOWN_BY_NOW)
+        yaw = float(euler_from_quaternion(estimate[ATTITUDE])[2])
+        target = PositionTarget(0, estimate[POSITION], velocity, acceleration, yaw, 0.0)
+        return self.update(target, seen, dt)
