@@ -70,18 +70,21 @@ def test_a_rehearsal_ends_as_a_flight():
 
 def test_a_fault_that_did_not_begin_is_a_note(tmp_path, make_flight):
     series = make_flight()
-    begun = record("mocap_dropout", 5.0, None, {})
+    begun = [record("mocap_dropout", 5.0, None, {}), record("wind_gust", 6.0, 7.0, {"speed": 2.0})]
     planned = [
         {"fault": "mocap_dropout", "at": 5.0},
         {"fault": "mocap_dropout", "at": "pick", "after": 500.0},
+        {"fault": "wind_gust", "at": "land", "speed": 3.0},
+        {"fault": "wind_gust", "at": 6.0, "duration": 1.0, "speed": 2.0},
         {"fault": "motor_loss", "at": 900.0},
     ]
     known = series.info | {"faults_planned": planned}
-    outcome = Outcome(series, faults=[begun])
+    outcome = Outcome(series, faults=begun)
     for _ in range(2):  # as the flight and as its log
         complete(ResultFolder(tmp_path), known, outcome)
     late = "did not begin: the flight ended before"
     assert outcome.notes == [
         f"the fault mocap_dropout@pick+500 {late}",
+        f"the fault wind_gust@land {late}",
         f"the fault motor_loss@900.0 {late}",
     ]

@@ -1,6 +1,5 @@
 """Result of a flight, the same for both engines, and what completes its result folder."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -77,11 +76,13 @@ def _not_begun(
     planned: Sequence[Mapping[str, Any]], begun: Sequence[Mapping[str, Any]]
 ) -> list[str]:
     """Return a note for each fault that did not begin; both as in info.json."""
-    left, notes = Counter(one["fault"] for one in begun), []
+    left, notes = [(one["fault"], one["parameters"]) for one in begun], []
     for one in planned:
         name, after = one["fault"], one.get("after")
-        left[name] -= 1
-        if left[name] < 0:
+        same = [other for other in left if other[0] == name and other[1].items() <= one.items()]
+        if same:
+            left.remove(same[0])
+        else:
             when = f"{one['at']}+{after:g}" if after else one["at"]
             notes.append(f"the fault {name}@{when} did not begin: the flight ended before")
     return notes
