@@ -15,7 +15,7 @@ LEVEL = np.zeros(3)
 def flown(thrust=0.52):
     hold = LevelHold(HoldParameters(), 9.81)
     for k in range(1000):
-        hold.good(k * 0.004, Desired(np.zeros(3), level(0.0), thrust))
+        hold.good(k * 0.004, Desired(np.zeros(3), level(0.0), thrust), LEVEL)
     return hold
 
 
@@ -73,7 +73,7 @@ def test_without_hope_it_ends_sooner():
 
 def test_thrust_is_an_average_not_the_last_value():
     hold = flown()
-    hold.good(4.0, Desired(np.zeros(3), level(0.0), 0.9))
+    hold.good(4.0, Desired(np.zeros(3), level(0.0), 0.9), LEVEL)
     thrust = hold.setpoint(4.004, TILTED, UNKNOWN).thrust
     assert 0.52 < thrust < 0.53
 
@@ -82,7 +82,7 @@ def test_the_thrust_of_a_command_that_is_not_flown_does_not_count():
     hold = flown()
     before = hold.mean_thrust
     for k in range(100):
-        hold.good(4.0 + 0.004 * k, Desired(np.zeros(3), level(0.0), 0.9), followed=False)
+        hold.good(4.0 + 0.004 * k, Desired(np.zeros(3), level(0.0), 0.9), LEVEL, followed=False)
     assert hold.mean_thrust == before and not hold.active
 
 
@@ -91,7 +91,7 @@ def test_ends_after_its_time_and_starts_anew():
     assert hold.setpoint(4.0, TILTED, UNKNOWN) is not None
     assert hold.setpoint(5.99, TILTED, UNKNOWN) is not None
     assert hold.setpoint(6.01, TILTED, UNKNOWN) is None
-    hold.good(6.1, Desired(np.zeros(3), level(0.0), 0.5))
+    hold.good(6.1, Desired(np.zeros(3), level(0.0), 0.5), LEVEL)
     assert not hold.active
     assert hold.setpoint(6.2, TILTED, UNKNOWN) is not None
 
@@ -113,9 +113,37 @@ def test_less_gravity_means_more_tilt():
     # the desired tilt of 0.5 m/s^2 is 0.5 / g, and the rate is 6 times the tilt
     moon, earth = LevelHold(HoldParameters(), 1.625), LevelHold(HoldParameters(), 9.75)
     for hold in (moon, earth):
-        hold.good(0.0, Desired(np.zeros(3), level(0.0), 0.5))
+        hold.good(0.0, Desired(np.zeros(3), level(0.0), 0.5), LEVEL)
     found = [
         hold.setpoint(0.0, LEVEL, np.array([-0.1, 0.0, 0.0])).rates[1].item()
         for hold in (moon, earth)
     ]
     assert found == pytest.approx([6.0 * 0.1 / 1.625, 6.0 * 0.1 / 9.75])
+
+
+def test_the_thrust_of_a_tilted_flight_counts_by_its_vertical_part():
+    hold, attitude = LevelHold(HoldParameters(), 9.81), np.array([0.6, -0.3, 1.0])
+    hold.good(0.0, Desired(np.zeros(3), level(0.0), 0.5), attitude)
+    assert hold.mean_thrust == pytest.approx(0.5 * math.cos(0.6) * math.cos(0.3))
+
+
+def test_a_fast_vehicle_is_braked_before_it_is_left_to_the_autopilot():
+    """Its descent is level: at 5 m/s across the vehicle would turn over on the ground."""
+    hold, time, speed = flown(), 4.0, 5.0
+    while (
+        desired := hold.setpoint(time, LEVEL, np.array([speed, 0.0, 0.0]), 0.4, True)
+    ) is not None:
+        braked, time, speed = time, time + 0.02, speed - 0.02 * 9.81 * -desired.attitude[0, 1]
+    assert speed == pytest.approx(1.5, abs=0.1) and braked == pytest.approx(
+        4.0 + 3.5 / 1.5 + 0.4, abs=0.1
+    )
+
+
+@pytest.mark.parametrize(("speed", "longest"), [(1.4, 0.4), (math.nan, 0.4), (50.0, 4.4)])
+def test_a_slow_or_unknown_one_is_not_and_no_braking_is_endless(speed, longest):
+    hold, velocity = flown(), np.array([speed, 0.0, 0.0])
+    hold.setpoint(4.0, LEVEL, velocity, 0.4, True)
+    for k in range(1000):
+        if hold.setpoint(4.0 + 0.01 * k, LEVEL, velocity, 0.4, True) is None:
+            break
+    assert 0.01 * k == pytest.approx(longest, abs=0.02)

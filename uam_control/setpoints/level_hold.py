@@ -17,6 +17,11 @@ from uam_control.settings.parameter_set import ParameterSet, number
 _LAST = 0.05  # s before the end, rates 0: the autopilot holds the last setpoint until its failsafe
 UNKNOWN = np.full(3, math.nan)  # unknown attitude [rad] or velocity [m/s]
 _THRUST_TIME = 0.5  # s, over which the thrust of normal flight is averaged
+_FAST = 1.5  # m/s across, above which a failsafe begins with a braking
+_BRAKING = 4.0  # s, its longest time: a wrong estimate must not go on for ever
+# [m/s] unknown; braked by a thrust a bit below that of hover, as in the autopilot's own descent: a
+# vehicle that stands already must not lift off
+_CLIMBING = np.array([math.nan, math.nan, 0.3])
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class LevelHold:
     against it. A swinging arm pushes the vehicle: tilt and thrust act against the velocity.
     """
 
-    _time, _since, _thrust, _yaw = Number(), Known(), Known(), Number()
+    _time, _since, _slow, _thrust, _yaw = Number(), Known(), Number(), Known(), Number()
 
     def __init__(self, parameters: HoldParameters, gravity: float) -> None:
         """gravity [m/s^2]."""
@@ -77,11 +82,12 @@ class LevelHold:
         self._gravity = gravity
         self.rates = np.zeros(3)
         self._desired = np.zeros((3, 3))  # see `Desired.attitude`
-        # [s]: last tick, begin of the hold; thrust: mean; yaw [rad]: of the last valid command
-        self.memory = record("", "time since thrust yaw")
-        self.memory[0] = -math.inf, math.nan, math.nan, 0.0
+        # [s]: last tick, begin of the hold, and of its time after a braking; thrust: mean of its
+        # vertical part; yaw [rad]: of the last valid command
+        self.memory = record("", "time since slow thrust yaw")
+        self.memory[0] = -math.inf, math.nan, math.nan, math.nan, 0.0
         self._integral = np.zeros(2)  # rad/s
-        self._follow = prepared(follow_thrust, self.memory, 0.0, 0.0, 0.0, True)
+        self._follow = prepared(follow_thrust, self.memory, 0.0, 0.0, 0.0, UNKNOWN, True)
 
     @property
     def active(self) -> bool:
@@ -93,34 +99,45 @@ class LevelHold:
         """The mean thrust setpoint 0..1 of the flight so far, 0 without one."""
         return self._thrust or 0.0
 
-    def good(self, time: float, desired: Desired, followed: bool = True) -> None:
+    def good(
+        self, time: float, desired: Desired, attitude: np.ndarray, followed: bool = True
+    ) -> None:
         """Store thrust and yaw of a valid command at `time` [s]; the thrust of one that is flown.
 
-        followed: the autopilot is in OFFBOARD.
+        attitude (3,): the vehicle's roll, pitch, yaw [rad]; followed: the autopilot is in OFFBOARD.
         """
         yaw = desired.attitude.item(CHI, Z)
-        self._follow(self.memory, time, desired.thrust, yaw, followed)
+        self._follow(self.memory, time, desired.thrust, yaw, attitude, followed)
 
     def reset(self) -> None:
         """Clear the mean thrust; call it while the vehicle is on the ground."""
         self._thrust = self._since = None
 
     def setpoint(
-        self, time: float, attitude: np.ndarray, velocity: np.ndarray, longest: float | None = None
+        self,
+        time: float,
+        attitude: np.ndarray,
+        velocity: np.ndarray,
+        longest: float | None = None,
+        coasts: bool = False,
     ) -> Desired | None:
         """Return body rates, attitude and thrust at `time` [s]; None: the stream must stop.
 
         attitude (3,): roll, pitch, yaw [rad], FLU in ENU; an axis that is not finite gets rate 0.
         velocity (3,): [m/s], ENU; a component that is not finite is not braked. longest [s]:
-        in place of `hold_time`.
+        in place of `hold_time`. coasts: only a fast vehicle is braked, before `longest` begins.
         """
         if self._thrust is None:
             return None
         if self._since is None:
-            self._since = self._time = time
+            self._since = self._slow = self._time = time
             self._integral[:], self._desired[CHI, Z] = 0.0, self._yaw
+        if coasts and self._fast(time, velocity):
+            self._slow = time
+        elif coasts:
+            velocity = _CLIMBING
         allowed = self.parameters.hold_time if longest is None else longest
-        remaining = allowed - (time - self._since)
+        remaining = allowed - (time - self._slow)
         dt, self._time = max(0.0, time - self._time), time
         if remaining < 0.0:
             return None
@@ -134,6 +151,10 @@ class LevelHold:
         self._turn(Y, attitude[Y] - desired[Y], dt)
         thrust = min(1.0, self._thrust * (1.0 + up / self._gravity))
         return Desired(self.rates, self._desired, thrust)
+
+    def _fast(self, time: float, velocity: np.ndarray) -> bool:
+        across = math.hypot(velocity[X], velocity[Y])
+        return across > _FAST and time - self._since < _BRAKING
 
     def _turn(self, axis: int, tilt: float, dt: float) -> None:
         """Set the body rate about `axis` against the angle error `tilt` [rad]."""
@@ -164,12 +185,20 @@ class LevelHold:
 
 
 @borrowing
-def follow_thrust(hold: np.ndarray, time: float, thrust: float, yaw: float, followed: bool) -> None:
+def follow_thrust(
+    hold: np.ndarray,
+    time: float,
+    thrust: float,
+    yaw: float,
+    attitude: np.ndarray,
+    followed: bool,
+) -> None:
     """Do what `LevelHold.good` does; hold (1,): its memory."""
     m = hold[0]
     m.since, m.yaw = math.nan, yaw
     if not followed:
         return
+    thrust *= math.cos(attitude[X]) * math.cos(attitude[Y])
     dt = time - m.time
     m.time = time
     if math.isnan(m.thrust) or not 0.0 < dt < _THRUST_TIME:

@@ -11,8 +11,8 @@ without commands, or in the air before the first flight, none |
 | after a gap in which the autopilot's failsafe began | none until its reports are new, and on \
 the ground none: it lands and disarms |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
-`hold_time` (`release_time` without an estimate, `level_time` in failsafe), then no setpoint: the \
-autopilot's failsafe acts |
+`hold_time` (`release_time` without an estimate; in failsafe `level_time`, after a fast vehicle is \
+braked), then no setpoint: the autopilot's failsafe acts |
 """
 
 import math
@@ -32,9 +32,6 @@ from uam_control.setpoints.targets import STILL, Desired, SetpointType, Target, 
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
 # [rad/s] largest body rates that are kept for a released vehicle; a pilot yaws faster than it rolls
 MOST_RATES = np.array([2.0, 2.0, 3.5])
-# [m/s] unknown; braked by a thrust a bit below that of hover, as in the autopilot's own descent: a
-# vehicle that stands already must not lift off
-CLIMBING = np.array([math.nan, math.nan, 0.3])
 LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
 LOW_LIFT = 0.97  # the upper one near the ground: as above, and each hop would ask for more thrust
 
@@ -140,7 +137,7 @@ class SetpointSource:
                 setpoint = self.type(desired)
                 self.refused = setpoint.refused()
                 if not self.refused:
-                    self.hold.good(now, desired, situation.followed)
+                    self.hold.good(now, desired, attitude_now, situation.followed)
                     return setpoint
             self._say(f"setpoint refused: {self.refused}", None)
         elif not flying and tau_q is None and self._low(now, situation):
@@ -164,14 +161,14 @@ class SetpointSource:
             return self._at_present(now, situation)
         if not armed or (landed and not high):
             return self._idle
-        velocity, longest, p = UNKNOWN, None, self.hold.parameters
+        longest, p = None, self.hold.parameters
+        known = self._fresh(self._estimated, now)
+        velocity = self._motion[CHI_DOT, POSITION] if known else UNKNOWN
         if let_go:
-            velocity, longest = CLIMBING, p.level_time
-        elif not self._fresh(self._estimated, now):
+            longest = p.level_time
+        elif not known:
             longest = p.release_time
-        else:
-            velocity = self._motion[CHI_DOT, POSITION]
-        desired = self.hold.setpoint(now, self._attitude(now), velocity, longest)
+        desired = self.hold.setpoint(now, self._attitude(now), velocity, longest, let_go)
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
         if desired is None:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from uam_control.control.sample_hold import is_new, new_hold
+from uam_control.coordinates import ATTITUDE, CHI
 from uam_control.frames import swap_body
 from uam_control.maths.compiled import borrowing
 from uam_control.maths.memory import Flag, Number, put, record
@@ -324,7 +325,8 @@ def sending(port: PortSteps) -> Callable[[tuple], int]:
         if thrust < 0.0 or not math.isfinite(thrust + rates[0] + rates[1] + rates[2]):
             return DECIDE
         poll(to, now)
-        follow_thrust(a.hold, now, thrust, s.attitude_reference[0, 2], True)
+        attitude = s.state[CHI, ATTITUDE]
+        follow_thrust(a.hold, now, thrust, s.attitude_reference[0, 2], attitude, True)
         if pose_due(a.vision, now, s.state, True):
             send_vision(to, a.vision.numbers[0].exposed, a.vision.pose)
         send_setpoint(to, now, rates, thrust)
