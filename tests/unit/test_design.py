@@ -235,10 +235,13 @@ def test_a_profile_of_another_vehicle_is_named_with_numbers(designed):
 
 
 @pytest.mark.long  # ten seconds of a search
-def test_the_same_numbers_give_the_same_design(designed, tmp_path):
-    assert main(["vehicle", "design", str(designed[0]), "--out", str(tmp_path)]) == 0
+def test_the_same_numbers_give_the_same_design(designed, tmp_path, monkeypatch, capsys):
+    """The files are named so that the vehicle's file, in another folder, finds them."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["vehicle", "design", str(designed[0]), "--out", "made"]) == 0
     for name in ("small_profile.yaml", "small_autopilot.yaml"):
-        assert (tmp_path / name).read_text() == (designed[0].parent / name).read_text()
+        assert (tmp_path / "made" / name).read_text() == (designed[0].parent / name).read_text()
+    assert f"{{modular: {tmp_path}/made/small_profile.yaml}}, auto" in capsys.readouterr().out
 
 
 @pytest.mark.long  # ten seconds of a search

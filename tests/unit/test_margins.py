@@ -324,3 +324,8 @@ def test_a_loop_that_acts_on_nothing_has_no_crossing_and_no_warning():
         found = margins(omega, np.where(omega < 3.0, 0.5 + 0.0j, 0.0j))
     assert found.delay == found.gain_down == math.inf
     assert found.peak == 1.0
+
+
+def test_a_posture_beyond_the_joints_ranges_is_refused(tmp_path, capsys):
+    assert main(["margins", "--initial", "--arm", "0", "90", "--out", str(tmp_path)]) == 2
+    assert "--arm: alpha_2 90 is outside" in capsys.readouterr().err

@@ -60,6 +60,10 @@ def run(options: argparse.Namespace) -> int:
     joints = len(described.joints)
     if options.arm is not None and len(options.arm) != joints:
         raise SettingsError(f"--arm: {len(options.arm)} angles, the vehicle has {joints} joints")
+    for joint, angle in zip(described.joints, options.arm or (), strict=False):
+        if not joint.low <= angle <= joint.high:
+            allowed = f"{joint.low:.2f} to {joint.high:.2f} rad"
+            raise SettingsError(f"--arm: {joint.name} {angle:g} is outside {allowed}")
     if profile.setpoint not in MODELLED:
         known = " or ".join(MODELLED)
         raise SettingsError(f"{profile.name}: margins need setpoint: {known}")

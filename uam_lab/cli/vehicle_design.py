@@ -50,6 +50,6 @@ def run(options: argparse.Namespace) -> int:
     if folder is not None or "profiles" in numbers or "autopilot" in numbers:
         say(
             f"{described.file.name} flies with these gains after: profiles: {{modular: "
-            f"{written[PROFILE_FILE]}}}, autopilot: {written[AUTOPILOT_FILE]}"
+            f"{written[PROFILE_FILE].absolute()}}}, autopilot: {written[AUTOPILOT_FILE].absolute()}"
         )
     return 0
