@@ -15,8 +15,9 @@ from sensor_msgs.msg import BatteryState
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import arm_coordinates
+from uam_control.settings.preflight_check import PreflightCheck
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import preflight_message, read_items
+from uam_msgs_py.messages.checklist import preflight_message, read_checks
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, SetpointWriter
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, RadioState
@@ -38,8 +39,7 @@ OPTIONS = {
 }
 
 
-class GreenLine:
-    name, value, limit, passed = "mocap", "0 s", "at most 0.1 s", True
+GREEN = PreflightCheck("mocap", "0 s", "at most 0.1 s", True)
 
 
 class Hands:
@@ -117,7 +117,7 @@ class Hands:
         state.status = [*state.status, *radio.status, read]
         self.states[topics.AUTOPILOT_STATE].publish(state)
         self.states[topics.AUTOPILOT_BATTERY].publish(BatteryState(percentage=self.battery))
-        self.states[topics.PREFLIGHT].publish(preflight_message(stamp, [GreenLine]))
+        self.states[topics.PREFLIGHT].publish(preflight_message(stamp, [GREEN]))
         array = DiagnosticArray()
         for name in NODES.split(","):
             if name != self.left:
@@ -133,7 +133,7 @@ class Hands:
 
     @property
     def items(self):
-        return {one.name: one for one in read_items(self.reports[-1])} if self.reports else {}
+        return {one.name: one for one in read_checks(self.reports[-1])} if self.reports else {}
 
     def until(self, condition, what):
         """Publish until `condition()`."""

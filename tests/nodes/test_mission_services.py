@@ -12,7 +12,7 @@ from vehicle_rig import PERIOD, Vehicle, take_off
 
 from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import checklist_message, read_preflight
+from uam_msgs_py.messages.checklist import checklist_message, read_checks
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import TrajectoryWriter
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
@@ -153,7 +153,7 @@ def test_a_required_checklist_refuses_the_start_until_it_has_passed(start, probe
         def known():
             reports.publish(checklist_message(vehicle.stamp, sent, []))
             vehicle.fly(10)
-            found = {line[0]: line[1] for m in seen for line in read_preflight(m)}
+            found = {line[0]: line[1] for m in seen for line in read_checks(m)}
             return found.get("checklist") == words
 
         probe.until(known, f"the report {words}")

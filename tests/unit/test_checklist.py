@@ -28,7 +28,7 @@ from uam_lab.preflight.checklist.observation import (
     StreamReport,
 )
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState
-from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message, read_items
+from uam_msgs_py.messages.checklist import checklist_message, read_checks
 from uam_msgs_py.messages.status import ChecklistState, RadioState
 
 LIMITS = ChecklistParameters()
@@ -373,14 +373,16 @@ def test_the_computer_is_read(tmp_path):
 
 def test_the_message_and_back():
     items = [
-        ChecklistItem("battery", "automatic", "failed", "40 %", "at least 60 %"),
-        ChecklistItem("clear", "guided", "passed", "confirmed", "confirmed", "12.5", True),
-        ChecklistItem("lift", "guided", "open", "", "at least 0.2 m"),
+        PreflightCheck("battery", "40 %", "at least 60 %", False, kind="automatic"),
+        PreflightCheck(
+            "clear", "confirmed", "confirmed", True, kind="guided", time="12.5", confirmed=True
+        ),
+        PreflightCheck("lift", "", "at least 0.2 m", None, kind="guided"),
     ]
     state = ChecklistState(False, "battery; lift", "lift", "motion", "Lift it.", "up", True, True)
     message = checklist_message(4_000_000_000, state, items)
     assert ChecklistState.from_message(message) == (4_000_000_000, state)
-    assert read_items(message) == items
+    assert read_checks(message) == items
     assert state.summary == "open: battery; lift"
     assert ChecklistState(True).summary == "all items passed"
 

@@ -4,17 +4,17 @@ import io
 
 import pytest
 
+from uam_control.settings.preflight_check import PreflightCheck
 from uam_lab.cli import checklist
 from uam_lab.cli.checklist import drawn
 from uam_lab.cli.keys import Keys
 from uam_lab.records.results.terminal import Terminal
-from uam_msgs_py.messages.checklist import ChecklistItem
 from uam_msgs_py.messages.status import ChecklistState
 
 ITEMS = [
-    ChecklistItem("battery", "automatic", "passed", "90 %", "at least 60 %"),
-    ChecklistItem("radio", "automatic", "failed", "unknown", "received"),
-    ChecklistItem("lift", "guided", "open", "", "up at least 0.2 m"),
+    PreflightCheck("battery", "90 %", "at least 60 %", True, kind="automatic"),
+    PreflightCheck("radio", "unknown", "received", False, kind="automatic"),
+    PreflightCheck("lift", "", "up at least 0.2 m", None, kind="guided"),
 ]
 LIFT = ChecklistState(False, "radio; lift", "lift", "confirm", "Lift it.", "up +0.10 m")
 

@@ -21,7 +21,7 @@ from uam_lab.cockpit.headline import ChecklistPanel, _facts, checklist_html, hea
 from uam_lab.cockpit.page import BUTTONS
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, CHAIN, GOOD, TICK, UNKNOWN, Health, grade
 from uam_lab.cockpit.vehicle_view import MOST_FRAMES, VehicleView, shapes
-from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
+from uam_msgs_py.messages.checklist import checklist_message
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import (
     ERROR,
@@ -294,9 +294,9 @@ def test_the_next_port_is_taken_where_one_is_in_use():
 
 def test_the_checklist_shows_the_step_and_what_is_open():
     items = [
-        ChecklistItem("battery", "automatic", "passed", "90 %", "at least 60 %"),
-        ChecklistItem("radio", "automatic", "failed", "<not> received", "received"),
-        ChecklistItem("lift", "guided", "open", "", "up at least 0.2 m"),
+        PreflightCheck("battery", "90 %", "at least 60 %", True, kind="automatic"),
+        PreflightCheck("radio", "<not> received", "received", False, kind="automatic"),
+        PreflightCheck("lift", "", "up at least 0.2 m", None, kind="guided"),
     ]
     state = ChecklistState(False, "radio; lift", "lift", "motion", "Lift it.", "up +0.10 m")
     shown = checklist_html(state, items)

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from uam_control.settings.preflight_check import PreflightCheck
 from uam_lab.cli.main import main
 from uam_lab.experiments.faults import rehearsed
 from uam_lab.experiments.faults.matrix import Cell, Promise
@@ -24,7 +25,7 @@ from uam_lab.flights.vehicle.lab_file import LabError, load_lab, settings_of, te
 from uam_lab.records.recording.logged_topics import latencies
 from uam_lab.records.results.outcome import Outcome
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
+from uam_msgs_py.messages.checklist import checklist_message
 from uam_msgs_py.messages.status import ChecklistState
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed
@@ -228,13 +229,13 @@ def test_latencies_of_given_ticks():
 
 def test_the_starter_reads_the_lists():
     items = [
-        ChecklistItem("poses", "automatic", "passed", "100 Hz", "at least 100 Hz"),
-        ChecklistItem("battery", "automatic", "failed", "50 %", "at least 60 %"),
+        PreflightCheck("poses", "100 Hz", "at least 100 Hz", True, kind="automatic"),
+        PreflightCheck("battery", "50 %", "at least 60 %", False, kind="automatic"),
     ]
     message = checklist_message(1, ChecklistState(False, "battery; lift"), items)
     (_, state), found = DECODE[topics.CHECKLIST](message)
     assert not state.passed and state.summary == "open: battery; lift"
-    assert [one.result for one in found] == ["passed", "failed"]
+    assert [one.passed for one in found] == [True, False]
     (_, state), _ = DECODE[topics.CHECKLIST](checklist_message(1, ChecklistState(True), []))
     assert state.passed
 

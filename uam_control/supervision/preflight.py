@@ -2,32 +2,17 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import ARM, CHI, CHI_DOT, POSITION
+from uam_control.settings.preflight_check import PreflightCheck
 from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.observation import Observation
 
 # quantities that must be known; others (battery, temperature) may be missing
 REQUIRED = ("mocap", "joint angles", CONTROLLERS, "autopilot")
 UNKNOWN = "unknown"
-
-
-class PreflightCheck(NamedTuple):
-    """One line of a report; value and limit with their units."""
-
-    name: str
-    value: str
-    limit: str
-    passed: bool
-    standing: bool = False  # of the checklist, judged only while nobody moves the vehicle
-
-    @property
-    def text(self) -> str:
-        """The check in one line."""
-        return f"{self.name}: {self.value} ({self.limit})"
 
 
 def preflight(

@@ -24,10 +24,10 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from uam_control.settings.preflight_check import AUTOMATIC, PreflightCheck
 from uam_lab.cli.command import Command, guest_of
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.terminal import Terminal, say
-from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem
 from uam_msgs_py.messages.status import ChecklistState
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 DONE, OPEN_ITEMS = 0, 1  # exit status
 SHOW, CONFIRM, REPEAT, LIVE = "show", "confirm", "repeat", "live"
 PERIOD = 0.2  # [s] between two pictures
-MARKS = {PASSED: ("ok", "green"), FAILED: ("FAIL", "bold red"), OPEN: ("open", "yellow")}
+MARKS = {True: ("ok", "green"), False: ("FAIL", "bold red"), None: ("open", "yellow")}
 KEYS = "c or Enter: confirm    r: repeat    q: quit"
 
 
@@ -98,7 +98,7 @@ def _live(operator: Operator) -> int:
 
 def drawn(
     state: ChecklistState,
-    items: Sequence[ChecklistItem],
+    items: Sequence[PreflightCheck],
     answer: str = "",
     live: bool = False,
     keys: bool = False,
@@ -113,7 +113,7 @@ def drawn(
         parts.append(Text(KEYS, style="dim"))
     if answer:
         parts.append(Text(answer))
-    fine = [one for one in items if one.kind == "automatic" and one.result == PASSED]
+    fine = [one for one in items if one.kind == AUTOMATIC and one.passed]
     if live and fine:
         parts.append(Text(f"{len(fine)} automatic items pass", style="green"))
         items = [one for one in items if one not in fine]
@@ -131,12 +131,12 @@ def _step(state: ChecklistState) -> Panel:
     return Panel(Group(*lines), title=Text(state.step), style="red" if state.failed else "cyan")
 
 
-def _table(state: ChecklistState, items: Sequence[ChecklistItem]) -> Table:
+def _table(state: ChecklistState, items: Sequence[PreflightCheck]) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in ("", "item", "value", "limit"):
         table.add_column(name, overflow="fold")
     for item in items:
-        mark, style = MARKS[item.result]
+        mark, style = MARKS[item.passed]
         if item.name == state.step:
             mark, style = "-->", "bold cyan" if not state.failed else "bold red"
         table.add_row(Text(mark, style=style), item.name, item.value, item.limit)

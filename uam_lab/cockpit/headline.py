@@ -8,11 +8,12 @@ from typing import Any
 import viser
 from std_srvs.srv import Trigger
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit.commands import Later, Said
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
 from uam_lab.records.results import templates
-from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, read_items
+from uam_msgs_py.messages.checklist import read_checks
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState
 
 COLOURS = {GOOD: "#1b8a5a", CAUTION: "#c77700", BAD: "#c62828", UNKNOWN: "#777777"}
@@ -26,7 +27,7 @@ ERRORS = (
     ("arm", "arm_error", math.degrees(1.0), "°"),
 )
 Row = tuple[str, str, str]  # name, level, text
-LEVELS = {PASSED: GOOD, FAILED: BAD, OPEN: UNKNOWN}
+LEVELS = {True: GOOD, False: BAD, None: UNKNOWN}
 TOP = -1.0  # place on the panel: above the headline
 ACTIONS = (("Confirm", "confirm", "CHECK"), ("Repeat the step", "repeat", "REPEAT"))
 
@@ -129,13 +130,13 @@ def _nodes(health: Health) -> list[Row]:
     return problems[:SHOWN] + [("", CAUTION, f"and {more} more")] * (more > 0)
 
 
-def checklist_html(state: ChecklistState, items: Sequence[ChecklistItem]) -> str:
+def checklist_html(state: ChecklistState, items: Sequence[PreflightCheck]) -> str:
     """Return the HTML: the present step, and the items that have not passed."""
     rows = []
     for item in items:
-        if item.result == PASSED:
+        if item.passed:
             continue
-        level = CAUTION if item.name == state.step and not state.failed else LEVELS[item.result]
+        level = CAUTION if item.name == state.step and not state.failed else LEVELS[item.passed]
         rows.append((level, MARKS[level], item.name, item.value, item.limit))
     return templates.render(
         "uam_lab.cockpit",
@@ -143,7 +144,7 @@ def checklist_html(state: ChecklistState, items: Sequence[ChecklistItem]) -> str
         colours=COLOURS,
         state=state,
         rows=rows,
-        passed=sum(item.result == PASSED for item in items),
+        passed=sum(bool(item.passed) for item in items),
         count=len(items),
     )
 
@@ -166,7 +167,7 @@ class ChecklistPanel:
 
     def show(self, message: Any) -> None:
         state = ChecklistState.from_message(message)[1]
-        shown = checklist_html(state, read_items(message))
+        shown = checklist_html(state, read_checks(message))
         if self._html is None:
             self._create()
         if shown != self._shown:

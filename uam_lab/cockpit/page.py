@@ -11,7 +11,6 @@ import numpy as np
 import viser
 
 from uam_control.coordinates import ARM
-from uam_control.supervision import PreflightCheck
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.commands import BUTTONS, GOAL, Button, Commands, Later
@@ -25,7 +24,7 @@ from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
 from uam_lab.cockpit.web import PlainPage
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import read_preflight
+from uam_msgs_py.messages.checklist import read_checks
 from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.tf_message import read_transforms
@@ -210,7 +209,7 @@ class Page:
         elif topic is topics.AUTOPILOT_STATE:
             health.autopilot = AutopilotState.from_message(message)[1]
         elif topic is topics.PREFLIGHT:
-            health.preflight = [PreflightCheck(*line) for line in read_preflight(message)]
+            health.preflight = read_checks(message)
         elif topic is topics.CHECKLIST:
             self._checklist.show(message)
         elif topic is topics.CHANGES:

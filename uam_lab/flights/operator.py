@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 
 from uam_control.supervision import PreflightCheck
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import ChecklistItem, read_items, read_preflight
+from uam_msgs_py.messages.checklist import read_checks
 from uam_msgs_py.messages.navigation import goal_message
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
 from uam_msgs_py.node.door import Door
@@ -23,8 +23,8 @@ from uam_sim_bridge.ports import flights
 DECODE: dict[topics.Topic, Callable[[DiagnosticArray], Any]] = {
     topics.MISSION_STATUS: MissionStatus.from_message,
     topics.AUTOPILOT_STATE: AutopilotState.from_message,
-    topics.PREFLIGHT: lambda message: list(read_preflight(message)),
-    topics.CHECKLIST: lambda m: (ChecklistState.from_message(m), read_items(m)),
+    topics.PREFLIGHT: read_checks,
+    topics.CHECKLIST: lambda m: (ChecklistState.from_message(m), read_checks(m)),
 }
 PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
 HAND_PLANNERS = (
@@ -138,9 +138,9 @@ class Operator:
 
     def preflight(self) -> list[PreflightCheck]:
         """Return the newest pre-arm report. Raises NoFlight."""
-        return [PreflightCheck(*line) for line in self._latest(topics.PREFLIGHT)]
+        return self._latest(topics.PREFLIGHT)
 
-    def checklist(self) -> tuple[ChecklistState, list[ChecklistItem]]:
+    def checklist(self) -> tuple[ChecklistState, list[PreflightCheck]]:
         """Return the newest state of the checklist, and its items. Raises NoFlight."""
         (_, state), items = self._latest(topics.CHECKLIST)
         return state, items

@@ -10,7 +10,6 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from uam_control.stamps import SECOND
-from uam_control.supervision import PreflightCheck
 from uam_control.vehicle import VehicleDescription
 from uam_lab.preflight.checklist.host import HostReader
 from uam_lab.preflight.checklist.limits import ChecklistParameters
@@ -28,7 +27,7 @@ from uam_lab.preflight.checklist.observation import (
 )
 from uam_lab.preflight.checklist.step import Situation
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import read_preflight
+from uam_msgs_py.messages.checklist import read_checks
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison
@@ -201,9 +200,7 @@ class Feed:
         self._magnet = bool(message.data)
 
     def _on_preflight(self, message: Any) -> None:
-        self.observation.preflight = tuple(
-            PreflightCheck(*line) for line in read_preflight(message)
-        )
+        self.observation.preflight = tuple(read_checks(message))
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:

@@ -15,11 +15,12 @@ from std_srvs.srv import SetBool, Trigger
 
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, switch, text, vector
+from uam_control.settings.preflight_check import GUIDED
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.services import Services
 from uam_lab.preflight.checklist.automatic import automatic
-from uam_lab.preflight.checklist.checklist import AUTOMATIC, GUIDED, Checklist, record
+from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.host import HostReader
 from uam_lab.preflight.checklist.limits import ChecklistParameters
@@ -27,7 +28,7 @@ from uam_lab.preflight.checklist.observation import Box, Observation
 from uam_lab.preflight.checklist.step import Step, StepState
 from uam_lab.preflight.checklist_feed import Feed
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import FAILED, OPEN, PASSED, ChecklistItem, checklist_message
+from uam_msgs_py.messages.checklist import checklist_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, ChecklistState, diagnostic
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.answering import ServingExecutor, offer
@@ -46,12 +47,6 @@ CORE = (
     *(wiring.RECORDER, wiring.ESTIMATOR, wiring.MISSION),
     *(wiring.POSITION, wiring.ATTITUDE, wiring.ARM, wiring.BRIDGE),
 )
-RESULTS = {
-    StepState.PASSED: PASSED,
-    StepState.FAILED: FAILED,
-    StepState.OPEN: OPEN,
-    StepState.ACTIVE: OPEN,
-}
 
 
 @dataclass(frozen=True)
@@ -193,22 +188,6 @@ class ChecklistNode:
             step.commands,
         )
 
-    def _items(self) -> list[ChecklistItem]:
-        found = [
-            ChecklistItem(one.name, AUTOMATIC, PASSED if one.passed else FAILED, one.value,
-                          one.limit)
-            for one in self._checklist.findings
-        ]  # fmt: skip
-        for one in self._checklist.steps:
-            at = "" if one.ended is None else f"{one.ended:.3f}"
-            found.append(
-                ChecklistItem(
-                    one.name, GUIDED, RESULTS[one.state], one.value or one.seen, one.limit, at,
-                    one.confirmed,
-                )
-            )  # fmt: skip
-        return found
-
     def _publish(self, wall: float) -> None:
         """Publish on a change of the step or of the permission, and each PUBLISH_PERIOD."""
         state = self.state
@@ -220,7 +199,7 @@ class ChecklistNode:
             return
         self._due, self._published = wall + PUBLISH_PERIOD, state
         stamp = round(self._feed.now * SECOND)
-        self._publisher.publish(checklist_message(stamp, state, self._items()))
+        self._publisher.publish(checklist_message(stamp, state, self._checklist.items))
         if wall >= self._diagnostics_due:
             self._diagnostics_due = wall + 1.0
             door = self._feed.door

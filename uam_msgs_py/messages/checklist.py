@@ -3,12 +3,11 @@
 A checklist has its state, then one status per item, a report one status per check.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Iterable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from uam_control.settings.preflight_check import PreflightCheck
 from uam_msgs_py.messages.status import (
     ERROR,
     OK,
@@ -19,25 +18,12 @@ from uam_msgs_py.messages.status import (
     texts_of,
 )
 
-PASSED, FAILED, OPEN = "passed", "failed", "open"
-LEVELS = {PASSED: OK, FAILED: ERROR, OPEN: STALE}
-
-
-@dataclass(frozen=True)
-class ChecklistItem:
-    """An item of a checklist."""
-
-    name: str
-    kind: str  # "automatic" or "guided"
-    result: str  # PASSED, FAILED or OPEN
-    value: str
-    limit: str
-    time: str = ""  # [s] of the result, by stamps, "" without one
-    confirmed: bool = False  # by the person
+LEVELS = {True: OK, False: ERROR, None: STALE}
+LIMIT = "limit"  # in every line, not in the state of a checklist
 
 
 def checklist_message(
-    stamp: int, state: ChecklistState, items: Iterable[ChecklistItem]
+    stamp: int, state: ChecklistState, items: Iterable[PreflightCheck]
 ) -> DiagnosticArray:
     """Return the message; stamp [ns]."""
     message = state.to_message(stamp)
@@ -45,61 +31,33 @@ def checklist_message(
     return message
 
 
-def _status(item: ChecklistItem) -> DiagnosticStatus:
-    values = {
-        "kind": item.kind,
-        "limit": item.limit,
-        "passed": item.result == PASSED,
-        "time": item.time,
-        "confirmed": item.confirmed,
-    }
-    return status_of(item.name, LEVELS.get(item.result, STALE), item.value, values)
-
-
-def read_items(message: DiagnosticArray) -> list[ChecklistItem]:
-    """Return the items of a message."""
-    results = {level: result for result, level in LEVELS.items()}
-    found = []
-    for status in message.status:
-        if status.name == ChecklistState.NAME:
-            continue
-        texts = texts_of(status)
-        found.append(
-            ChecklistItem(
-                status.name,
-                texts.get("kind", ""),
-                results.get(status.level, OPEN),
-                status.message,
-                texts.get("limit", ""),
-                texts.get("time", ""),
-                texts.get("confirmed") == "True",
-            )
-        )
-    return found
-
-
-class ReportedCheck(Protocol):
-    """A line of the report, see `uam_control.supervision.PreflightCheck`."""
-
-    name: str
-    value: str
-    limit: str
-    passed: bool
-
-
-def preflight_message(stamp: int, checks: Iterable[ReportedCheck]) -> DiagnosticArray:
+def preflight_message(stamp: int, checks: Iterable[PreflightCheck]) -> DiagnosticArray:
     """Return the message; stamp [ns]."""
-    levels = {True: OK, False: ERROR}
-    return diagnostics(
-        stamp,
-        [
-            status_of(one.name, levels[one.passed], one.value, {"limit": one.limit})
-            for one in checks
-        ],
-    )
+    return diagnostics(stamp, map(_status, checks))
 
 
-def read_preflight(message: DiagnosticArray) -> Iterator[tuple[str, str, str, bool]]:
-    """Yield name, value, limit and whether it passed, of each check."""
-    for status in message.status:
-        yield status.name, status.message, texts_of(status).get("limit", ""), status.level == OK
+def _status(one: PreflightCheck) -> DiagnosticStatus:
+    values = {LIMIT: one.limit}
+    if one.kind:
+        result = {"passed": one.passed is True, "time": one.time, "confirmed": one.confirmed}
+        values = {"kind": one.kind} | values | result
+    return status_of(one.name, LEVELS[one.passed], one.value, values)
+
+
+def read_checks(message: DiagnosticArray) -> list[PreflightCheck]:
+    """Return the items of a checklist, or the lines of a report."""
+    results = {level: passed for passed, level in LEVELS.items()}
+    texts = [(status, texts_of(status)) for status in message.status]
+    return [
+        PreflightCheck(
+            status.name,
+            status.message,
+            own[LIMIT],
+            results.get(status.level),
+            kind=own.get("kind", ""),
+            time=own.get("time", ""),
+            confirmed=own.get("confirmed") == "True",
+        )
+        for status, own in texts
+        if LIMIT in own
+    ]

@@ -30,7 +30,6 @@ from uam_lab.records.recording.logged_topics import LABORATORY_FILE
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, known_json, write_json
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.checklist import PASSED
 from uam_msgs_py.node import polling, wiring
 from uam_msgs_py.node.door import Door
 from uam_sim_bridge.nodes.laboratory import READY
@@ -73,7 +72,7 @@ class Starter(threading.Thread):
                 now = time.monotonic()
                 for (_, state), items in door.decoded(lists, DECODE[topics.CHECKLIST]):
                     passed, self.waits_for = passed or state.passed, state.summary
-                    count = sum(item.result == PASSED for item in items)
+                    count = sum(bool(item.passed) for item in items)
                     if count > most:  # not those that come and go
                         most, progress = count, now
                 if now - progress > PATIENCE:

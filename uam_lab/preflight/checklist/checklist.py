@@ -10,11 +10,9 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from uam_control.supervision import PreflightCheck
+from uam_control.settings.preflight_check import AUTOMATIC, GUIDED, PreflightCheck
 from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.step import Situation, Step, StepState
-
-AUTOMATIC, GUIDED = "automatic", "guided"
 
 
 class Checklist:
@@ -45,6 +43,12 @@ class Checklist:
     @property
     def passed(self) -> bool:
         return not self.failing_names
+
+    @property
+    def items(self) -> list[PreflightCheck]:
+        """Return all items as they are now."""
+        automatic = (one._replace(kind=AUTOMATIC) for one in self.findings)
+        return [*automatic, *(step.item for step in self.steps)]
 
     def update(self, now: Situation, findings: Iterable[PreflightCheck], armed: bool) -> None:
         """Judge what is seen at `now`; findings: of the automatic items."""
@@ -113,12 +117,12 @@ class Checklist:
         return f"; open: {names}" if names else ", all items have passed"
 
     def _note_step(self, step: Step) -> None:
-        self._note(GUIDED, step.finding, step.state, step.confirmed, step.tries)
+        self._note(GUIDED, step, step.state, step.confirmed, step.tries)
 
     def _note(
         self,
         kind: str,
-        finding: PreflightCheck,
+        one: PreflightCheck | Step,
         state: StepState,
         confirmed: bool = False,
         tries: int = 0,
@@ -127,12 +131,13 @@ class Checklist:
 
         The value of an automatic item changes all the time and is no event.
         """
-        now = state.value, finding.value if kind == GUIDED else ""
-        if self._noted.get(finding.name) == now:
+        value = one.value or "open"
+        now = state.value, value if kind == GUIDED else ""
+        if self._noted.get(one.name) == now:
             return
-        self._noted[finding.name] = now
-        entry = {"time": self._time, "kind": kind, "name": finding.name, "state": state.value}
-        entry |= {"value": finding.value, "limit": finding.limit}
+        self._noted[one.name] = now
+        entry = {"time": self._time, "kind": kind, "name": one.name, "state": state.value}
+        entry |= {"value": value, "limit": one.limit}
         self.entries.append(entry | {"confirmed": confirmed, "tries": tries})
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from uam_control.supervision import PreflightCheck
+from uam_control.settings.preflight_check import GUIDED, PreflightCheck
 from uam_lab.preflight.checklist.observation import Sample
 
 MOTION, CONFIRM = "motion", "confirm"  # what a step needs
@@ -72,10 +72,13 @@ class Step:
         return self._instruction
 
     @property
-    def finding(self) -> PreflightCheck:
-        """Return the result."""
+    def item(self) -> PreflightCheck:
+        """Return the result, or what is seen now."""
+        passed = {StepState.PASSED: True, StepState.FAILED: False}.get(self.state)
+        time = "" if self.ended is None else f"{self.ended:.3f}"
+        value = self.value or self.seen
         return PreflightCheck(
-            self.name, self.value or "open", self.limit, self.state is StepState.PASSED
+            self.name, value, self.limit, passed, False, GUIDED, time, self.confirmed
         )
 
     def begin(self, time: float) -> None:
