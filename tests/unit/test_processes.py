@@ -9,7 +9,7 @@ import time
 import psutil
 import pytest
 
-from uam_lab.flights.processes import process_table, processes
+from uam_lab.flights.processes import child, process_table, processes
 from uam_lab.flights.processes.processes import NodeFailed, Processes
 
 SLEEPER = """
@@ -190,6 +190,14 @@ def test_a_stopped_child_is_named_while_it_is_stopped(children):
 def test_a_terminal_interrupt_does_not_reach_the_children(children):
     children.start("a", "sleeper")
     assert os.getpgid(children.pid("a")) != os.getpgid(0)
+
+
+def test_a_terminal_interrupt_of_before_is_no_interrupt_of_the_child():
+    with child.blocked(signal.SIGINT):
+        signal.raise_signal(signal.SIGINT)
+        child.obey_interrupts()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
 
 
 @pytest.mark.parametrize("stopped", [False, True])

@@ -1,6 +1,7 @@
 """Dask workers of this machine and of a scheduler: lost ones, other versions, the end."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -113,7 +114,10 @@ def test_difference_names_the_first_one():
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_worker_outlives_its_command(number):
-    """SIGINT goes to all processes of the terminal, SIGKILL to the command alone."""
+    """SIGINT goes to all processes of the terminal, SIGKILL to the command alone.
+
+    The workers leave SIGINT to the command.
+    """
     command = [sys.executable, str(Path(tiny_work.__file__))]
     with subprocess.Popen(
         command,
@@ -122,7 +126,9 @@ def test_no_worker_outlives_its_command(number):
         text=True,
         start_new_session=True,
     ) as main:
-        assert int(main.stdout.readline()) > 0
+        worker = psutil.Process(int(main.stdout.readline()))
+        (blocked,) = re.findall(r"SigBlk:\s+(\w+)", Path(f"/proc/{worker.pid}/status").read_text())
+        assert int(blocked, 16) & 1 << (signal.SIGINT - 1)
         children = psutil.Process(main.pid).children(recursive=True)
         assert len(children) >= 2
         (os.killpg if number == signal.SIGINT else os.kill)(main.pid, number)

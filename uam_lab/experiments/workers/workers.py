@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import multiprocessing.resource_tracker
 import os
 import queue
 import signal
@@ -47,6 +48,7 @@ def local_cluster(jobs: int) -> Iterator[LocalCluster]:
     """
     with dask.config.set(SETTINGS):
         # so Ctrl-C in the terminal reaches this process only
+        multiprocessing.resource_tracker.ensure_running()  # its start unblocks the signal
         with blocked(signal.SIGINT):
             cluster = LocalCluster(
                 n_workers=jobs,

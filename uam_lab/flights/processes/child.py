@@ -146,6 +146,12 @@ def _apart(pid: int) -> bool:
         return False
 
 
+def obey_interrupts() -> None:
+    """Let SIGINT act again, see `prepare`; one that has waited was the orchestrator's."""
+    signal.signal(signal.SIGINT, signal.signal(signal.SIGINT, signal.SIG_IGN))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
 def _run(
     name: str,
     module: str,
@@ -155,7 +161,7 @@ def _run(
 ) -> None:
     """Main function of the child: import the module and call its `main()`, which reads sys.argv."""
     os.setpgid(0, 0)  # Ctrl-C in the terminal reaches only the orchestrator
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # see `prepare`
+    obey_interrupts()
     setproctitle(f"{TITLE} {name}")  # before a change of the environment, next to it in memory
     with open(log, "ab", buffering=0) as output:
         for stream in (1, 2):
