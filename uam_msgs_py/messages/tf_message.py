@@ -29,6 +29,7 @@ from uam_msgs_py.messages.layouts import (
 )
 
 PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
+ELEMENT = "geometry_msgs/msg/TransformStamped"
 DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 # sha256 of the type's description; publishers and subscribers compare it
 HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
@@ -154,7 +155,7 @@ class _Assembled:
         )
         parts = sorted([*known, element.own], key=lambda part: part.type_name.data)
         self._referenced = (_IndividualDescription * len(parts))(*parts)
-        kind = _FieldType(NESTED_SEQUENCE, (0, 0), _string("geometry_msgs/msg/TransformStamped"))
+        kind = _FieldType(NESTED_SEQUENCE, (0, 0), _string(ELEMENT))
         self._fields = (_Field * 1)(_Field(_string(FIELD), kind, _string("")))
         own = _IndividualDescription(_string(f"{PACKAGE}/msg/{NAME}"), _sequence(self._fields))
         self._description = _Description(own, _sequence(self._referenced))

@@ -7,7 +7,6 @@ include/rosbag2_storage/yaml.hpp.
 
 import importlib.util
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -29,12 +28,6 @@ ROS_DISTRO = "jazzy"
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # RMW_DURATION_INFINITE: no deadline, no end
 AUTOMATIC = QoSLivelinessPolicy.AUTOMATIC  # the default of DDS
 SEPARATOR = "=" * 80
-# Field line: type, optional bound and array, name. Constants and comments never name a type.
-FIELD = re.compile(r"^\s*([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(?:<=)?\d*\])?\s+[A-Za-z]\w*")
-PRIMITIVES = {
-    *("bool", "byte", "char", "float32", "float64", "string", "wstring"),
-    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-}
 
 
 class DefinitionMissing(LookupError):
@@ -49,15 +42,14 @@ def definition(type_name: str) -> str:
 
 
 @cache
-def type_hash(type_name: str) -> str:
-    """Return the hash of `package/msg/Name` by which ROS compares types, `RIHS01_...`.
-
-    Raises DefinitionMissing.
-    """
+def type_hashes(type_name: str) -> dict[str, str]:
+    """Return the hashes by which ROS compares types, `RIHS01_...`: of `package/msg/Name`, and of
+    the types in it at any depth. Raises DefinitionMissing."""
     if _own(type_name):
-        return f"RIHS01_{tf_message.HASH.hex()}"
-    hashes = json.loads(_file(type_name, "json").read_text(encoding="utf-8"))["type_hashes"]
-    return next(one["hash_string"] for one in hashes if one["type_name"] == type_name)
+        own = {type_name: f"RIHS01_{tf_message.HASH.hex()}"}
+        return own | type_hashes(tf_message.ELEMENT)
+    listed = json.loads(_file(type_name, "json").read_text(encoding="utf-8"))["type_hashes"]
+    return {one["type_name"]: one["hash_string"] for one in listed}
 
 
 def _own(type_name: str) -> bool:
@@ -81,19 +73,6 @@ def _file(type_name: str, suffix: str) -> Path:
     raise DefinitionMissing(f"no definition of {type_name} above {module.origin}")
 
 
-def dependencies(type_name: str) -> list[str]:
-    """Return the message types of the fields of `package/msg/Name`, in order of appearance."""
-    package = type_name.partition("/")[0]
-    found: dict[str, None] = {}
-    for line in definition(type_name).splitlines():
-        field = FIELD.match(line)
-        if field is None or field[1] in PRIMITIVES:
-            continue
-        name = field[1] if "/" in field[1] else f"{package}/{field[1]}"
-        found["/msg/".join(name.replace("/msg/", "/").split("/"))] = None
-    return list(found)
-
-
 @cache
 def schema(type_name: str) -> str:
     """Return the complete `ros2msg` schema of `package/msg/Name`.
@@ -101,14 +80,10 @@ def schema(type_name: str) -> str:
     Raises DefinitionMissing if a required package is not installed.
     """
     parts = [definition(type_name)]
-    queue, seen = dependencies(type_name), {type_name}
-    while queue:
-        name = queue.pop(0)
-        if name in seen:
-            continue
-        seen.add(name)
-        parts.append(f"{SEPARATOR}\nMSG: {name.replace('/msg/', '/')}\n{definition(name)}")
-        queue += dependencies(name)
+    for name in type_hashes(type_name):
+        if name != type_name:
+            head = f"{SEPARATOR}\nMSG: {name.replace('/msg/', '/')}"
+            parts.append(f"{head}\n{definition(name)}")
     return "\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
@@ -125,7 +100,7 @@ def add_topic(log: BoundedLog, topic: BagTopic) -> int:
     """Add the topic's channel to the log, with its schema; return the channel's id."""
     metadata = {
         "offered_qos_profiles": yaml.safe_dump([offered_qos(topic.qos)], sort_keys=False).strip(),
-        "topic_type_hash": type_hash(topic.type_name),
+        "topic_type_hash": type_hashes(topic.type_name)[topic.type_name],
     }
     return log.add_channel(topic.name, topic.type_name, schema(topic.type_name), metadata)
 
@@ -173,7 +148,7 @@ def _counted(topic: BagTopic, counts: Mapping[str, int]) -> dict[str, Any]:
         "type": topic.type_name,
         "serialization_format": "cdr",
         "offered_qos_profiles": [offered_qos(topic.qos)],
-        "type_description_hash": type_hash(topic.type_name),
+        "type_description_hash": type_hashes(topic.type_name)[topic.type_name],
     }
     return {"topic_metadata": metadata, "message_count": counts[topic.name]}
 
