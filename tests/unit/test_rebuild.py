@@ -34,7 +34,7 @@ def test_the_folder_of_another_flight_is_refused(rehearsed, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     (other / "metrics.json").write_text("{}")
-    with pytest.raises(ResultFolderError, match="already contains a flight; give another --out"):
+    with pytest.raises(ResultFolderError, match="a flight or a report; give another --out"):
         rebuild(rehearsed, other)
     assert [file.name for file in other.iterdir()] == ["metrics.json"]
     rebuild(rehearsed, rehearsed / "../rehearsal")  # the same one by another name

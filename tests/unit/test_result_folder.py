@@ -78,6 +78,10 @@ def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
     with pytest.raises(ResultFolderError, match="already contains a flight"):
         ResultFolder.create("hover", "modular", out=here / "a/b")
     assert json.loads(folder.metrics.read_text()) == {"seed": 1}
+    (here / "campaign").mkdir()
+    (here / "campaign/report.html").touch()
+    with pytest.raises(ResultFolderError, match="or a report; give another --out"):
+        ResultFolder.create("hover", "modular", out=here / "campaign")
     inside = ResultFolder.create("hover", "modular", out=here / "results/mine")
     assert (here / "results/latest").resolve() == inside.path
 

@@ -125,9 +125,12 @@ class ResultFolder:
         return self.path.parent / LATEST
 
     def refuse_flight(self) -> None:
-        if any(file.exists() for file in (self.metrics, self.timeseries, self.log)):
+        """Raise ResultFolderError if there is a flight, or the report of many."""
+        page = self.path / "report.html"
+        if any(file.exists() for file in (self.metrics, self.timeseries, self.log, page)):
             raise ResultFolderError(
-                f"result folder {self.path} already contains a flight; give another --out"
+                f"result folder {self.path} already contains a flight or a report; give another "
+                "--out"
             )
 
     def release(self) -> None:
