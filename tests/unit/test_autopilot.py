@@ -269,6 +269,19 @@ def test_descent_without_vision_stays_level():
     assert -2.5 < bench.body.velocity[2] < 0.0
 
 
+@pytest.mark.parametrize("vision", [True, False])
+def test_a_fast_vehicle_is_braked_in_the_descent(vision):
+    """On the ground it would turn over."""
+    bench = airborne()
+    bench.body.position[2] = 5.0
+    bench.run(1.0, ((0.5, 0.0, 0.0), HOVER / 0.95))
+    bench.run(0.8, ((0.0, 0.0, 0.0), HOVER / 0.9))
+    assert math.hypot(*bench.body.velocity[:2]) > 3.0
+    bench.vision = vision
+    bench.run(3.5)
+    assert math.hypot(*bench.body.velocity[:2]) < 1.8 and bench.body.position[2] > 0.0
+
+
 def test_offboard_returns_only_on_request():
     bench = airborne()
     bench.run(1.5)

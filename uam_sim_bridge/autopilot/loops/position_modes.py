@@ -30,6 +30,7 @@ from uam_sim_bridge.autopilot.params import Parameters
 MODES = (Mode.HOLD, Mode.POSITION, Mode.RETURN)
 _STICK_ZERO = 0.1  # stick deflection that counts as none (PX4: MPC_HOLD_DZ)
 _AT_HOME = 0.3  # m, horizontal distance from which RETURN descends
+_FAST = 1.5  # m/s across, faster than which a descent brakes
 _BRAKING = 0.5  # s, the held position lies this far ahead of a moving vehicle
 _BELOW_HOVER = 0.3  # m/s^2 down, without a valid vertical velocity (PX4)
 _DOWN_BY_NOW = 5.0  # s of such a descent, after which the thrust falls
@@ -212,7 +213,8 @@ class PositionModes(PositionControl):
 
 
 class Descent(PositionControl):
-    """The cascade of the descent: what is across is not seen, so it stays level."""
+    """The cascade of the descent: across only what is faster than _FAST is seen, and braked; else
+    it stays level. PX4 stops across where it knows its velocity (mode Land)."""
 
     SPEEDS = PositionModes.SPEEDS
     _blind = 0.0  # s without a valid vertical velocity
@@ -237,9 +239,12 @@ class Descent(PositionControl):
             acceleration[2] = GRAVITY
         elif sink_known:
             velocity[2], seen[DOWN] = self._down, estimate[DOWN]
+            across = estimate[VELOCITY][:2]
+            seen[VELOCITY][:2] = across * (1.0 - _FAST / max(_FAST, math.hypot(*across)))
         else:
             self._blind += dt
             acceleration[2] = _BELOW_HOVER + _FALLING * max(0.0, self._blind - _DOWN_BY_NOW)
+        self._integral[:2] = 0.0
         yaw = float(euler_from_quaternion(estimate[ATTITUDE])[2])
         target = PositionTarget(0, estimate[POSITION], velocity, acceleration, yaw, 0.0)
         return self.update(target, seen, dt)
