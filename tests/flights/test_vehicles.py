@@ -199,6 +199,8 @@ def test_a_search_starts_from_the_profile_of_the_vehicle(tmp_path, capsys):
     assert main([*command, "--out", str(out)]) == 2
     assert "entries 0 to 1 are expected" in capsys.readouterr().err
     assert main([*command, "--vehicle", "s500_arm3", "--out", str(out)]) == 0
+    told = f"uam fly --vehicle s500_arm3 --controller modular --profile {out}/best.yaml"
+    assert told in capsys.readouterr().out
     best = (out / "best.yaml").read_text()
     assert "from profile s500_arm3." in best and "Vehicle: s500_arm3." in best
     start = default_profile("modular", load_description("s500_arm3"))

@@ -20,6 +20,7 @@ study.journal.
 """
 
 import argparse
+import shlex
 import signal
 
 from uam_control.laws import catalogue
@@ -125,6 +126,8 @@ def run(options: argparse.Namespace) -> int:
     say(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
     values = curve(study)
     say(f"search    {convergence(values, options.patience or max(LEAST, len(values) // 2))}")
-    say(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
+    law = next(iter(space.start.laws().values()))
+    flown = ["uam", "fly", "--vehicle", str(options.vehicle), "--controller", law, "--profile"]
+    say(f"profile   {out / 'best.yaml'}   ({shlex.join([*flown, str(out / 'best.yaml')])})")
     say(f"plot      {out / 'search.png'}")
     return status
