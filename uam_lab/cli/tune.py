@@ -124,6 +124,8 @@ def run(options: argparse.Namespace) -> int:
     best, told = search_results.best_of(space, study), search_results.in_words
     begun = told(evaluated_start(space, study))
     say(f"best      evaluation {best.number}, {told(best)}; start: {begun}")
+    if space.delay_margin is not None and best.values[1] < space.delay_margin:
+        say(f"margin    none found has {1e3 * space.delay_margin:g} ms: the best has the largest")
     values = curve(study)
     say(f"search    {convergence(values, options.patience or max(LEAST, len(values) // 2))}")
     law = next(iter(space.start.laws().values()))

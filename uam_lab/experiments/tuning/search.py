@@ -59,7 +59,7 @@ def open_storage(where: str) -> JournalStorage | RDBStorage:
 def open_study(task: Task) -> optuna.Study:
     """Open the study, a new one if there is none. Raises TuningError."""
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    warnings.filterwarnings("ignore", category=FutureWarning, module="optuna")
+    warnings.filterwarnings("ignore", module="optuna")
     space = task.space
     if space.delay_margin is None:
         directions = ["minimize"]
