@@ -17,7 +17,7 @@ from uam_control.settings.parameter_set import ParameterSet, number
 _LAST = 0.05  # s before the end, rates 0: the autopilot holds the last setpoint until its failsafe
 UNKNOWN = np.full(3, math.nan)  # unknown attitude [rad] or velocity [m/s]
 _THRUST_TIME = 0.5  # s, over which the thrust of normal flight is averaged
-_FAST = 1.5  # m/s across, above which a failsafe begins with a braking
+_FAST = 1.0  # m/s across, above which a failsafe begins with a braking
 _BRAKING = 4.0  # s, its longest time: a wrong estimate must not go on for ever
 # [m/s] unknown; braked by a thrust a bit below that of hover, as in the autopilot's own descent: a
 # vehicle that stands already must not lift off

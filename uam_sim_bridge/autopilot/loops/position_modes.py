@@ -30,7 +30,7 @@ from uam_sim_bridge.autopilot.params import Parameters
 MODES = (Mode.HOLD, Mode.POSITION, Mode.RETURN)
 _STICK_ZERO = 0.1  # stick deflection that counts as none (PX4: MPC_HOLD_DZ)
 _AT_HOME = 0.3  # m, horizontal distance from which RETURN descends
-_FAST = 1.5  # m/s across, faster than which a descent brakes
+_FAST = 1.0  # m/s across, faster than which a descent brakes
 _BRAKING = 0.5  # s, the held position lies this far ahead of a moving vehicle
 _BELOW_HOVER = 0.3  # m/s^2 down, without a valid vertical velocity (PX4)
 _DOWN_BY_NOW = 5.0  # s of such a descent, after which the thrust falls
