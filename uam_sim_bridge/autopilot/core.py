@@ -39,12 +39,7 @@ from uam_sim_bridge.autopilot.cycle import (
 )
 from uam_sim_bridge.autopilot.landing import LandDetector
 from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
-from uam_sim_bridge.autopilot.loops.position_modes import (
-    MODES,
-    Descent,
-    PositionControl,
-    PositionModes,
-)
+from uam_sim_bridge.autopilot.loops.position_modes import MODES, PositionControl, PositionModes
 from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
     TORQUE,
@@ -93,7 +88,6 @@ class Autopilot:
         self.commander = Commander(self.parameters)
         self.landing = LandDetector(self.parameters)
         self.battery = SimulatedBattery(self.parameters)
-        self._descent = Descent(self.parameters)
         self._position_modes = PositionModes(self.parameters)
         self._setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
         self._position: PositionTarget | None = None  # flown in place of body rates or attitude
@@ -250,7 +244,6 @@ class Autopilot:
         elif commander.armed and self._position is not None and not aided:
             setpoint, descending = self._descend(dt), True
         else:
-            self._descent.reset()
             self._position_modes.reset()
             self._flew_rates = True
             if commander.armed and self._position is not None:
@@ -325,7 +318,9 @@ class Autopilot:
     def _descend(self, dt: float) -> np.ndarray:
         """Return the setpoint (4,) of the level descent."""
         known, contact = self._sink_known(self._time), self.landing.contact
-        return self._descent.fly(self.estimator.estimate, dt, known, contact, self._hover)
+        return self._position_modes.descend(
+            self.estimator.estimate, dt, known, contact, self._hover
+        )
 
     def _sink_known(self, time: float) -> bool:
         return self.estimator.unaided_for(time) < self.parameters["EKF2_NOAID_TOUT"] * 1e-6
@@ -367,6 +362,5 @@ class Autopilot:
         self._take_vision = prepared(
             take_vision, 0.0, still, np.zeros(4), 0.0, self.estimator.arrays
         )
-        self._descent.configure(p)
         self._position_modes.configure(p)
         self._position_control.configure(p)

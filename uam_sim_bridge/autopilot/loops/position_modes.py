@@ -159,7 +159,7 @@ def attitude_of(axis: np.ndarray, yaw: float) -> np.ndarray:
 
 
 class PositionModes(PositionControl):
-    """The cascade of the modes without a companion, with lower speeds.
+    """The cascade of the modes without a companion, with lower speeds; of a failsafe's descent.
 
     `sinking`, `climbing`: whether the last setpoint descends to the ground, or climbs by the stick.
     """
@@ -174,10 +174,11 @@ class PositionModes(PositionControl):
         self._held: np.ndarray | None = None  # position [m, NED]
         self._mode: Mode | None = None
         self._yaw = 0.0
+        self._blind = 0.0  # s of a descent without a valid vertical velocity
 
     def reset(self) -> None:
         super().reset()
-        self._mode, self.sinking = None, False
+        self._mode, self.sinking, self._blind = None, False, 0.0
 
     def fly(self, mode: Mode, estimate: np.ndarray, dt: float, hover: float) -> np.ndarray:
         """Return as `update`; hover: thrust of hover, as estimated."""
@@ -211,31 +212,22 @@ class PositionModes(PositionControl):
             self._yaw += math.radians(self._parameters["MPC_MAN_Y_MAX"]) * sticks[3] * dt
         return velocity
 
-
-class Descent(PositionControl):
-    """The cascade of the descent: across only what is faster than _FAST is seen, and braked; else
-    it stays level. PX4 stops across where it knows its velocity (mode Land)."""
-
-    SPEEDS = PositionModes.SPEEDS
-    _blind = 0.0  # s without a valid vertical velocity
-
-    def reset(self) -> None:
-        super().reset()
-        self._blind = 0.0
-
-    def fly(
+    def descend(
         self, estimate: np.ndarray, dt: float, sink_known: bool, contact: bool, hover: float
     ) -> np.ndarray:
-        """Return as `update`; hover: thrust of hover, as estimated.
+        """Return as `fly`. Across only what is faster than _FAST is seen, and braked; else it stays
+        level. PX4 stops across where it knows its velocity (mode Land).
 
         sink_known: the vertical velocity is valid; contact: the ground is touched, and the vehicle
         only waits for the end of the flight, as in PX4.
         """
+        if contact or self._mode is not Mode.LAND:
+            self.reset()
+            self._mode = Mode.LAND
         self._hover = hover
         velocity, acceleration, seen = np.zeros(3), np.zeros(3), estimate.copy()
         seen[VELOCITY] = 0.0
         if contact:
-            self.reset()
             acceleration[2] = GRAVITY
         elif sink_known:
             velocity[2], seen[DOWN] = self._down, estimate[DOWN]
