@@ -20,7 +20,7 @@ from uam_lab.records.results import timeseries
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.layouts import stamp_of
-from uam_msgs_py.node.polling import listen
+from uam_msgs_py.node.door import Door
 
 NODES = ("position_controller", "attitude_controller", "arm_controller", "state_estimator")
 COUNT = 500
@@ -67,7 +67,7 @@ class Tuner:
             node: self.node.create_client(SetParametersAtomically, f"/{node}/{service}")
             for node in NODES
         }
-        self._clock = listen(self.node, topics.CLOCK, raw=True)
+        self._clock = Door(self.node).listen(topics.CLOCK, raw=True)
         self._now = 0
         self.reported = []  # (stamp [ns], change)
         topic = topics.CHANGES

@@ -10,7 +10,6 @@ from uam_msgs_py.messages.status import ERROR
 from uam_msgs_py.node.answering import answered
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.executor import LeanExecutor
-from uam_msgs_py.node.polling import listen
 
 BROKEN = (b"", b"\0", bytes.fromhex("00010000ffffffff"), b"\0\1\0\0" + b"\xff" * 60)
 
@@ -64,7 +63,8 @@ def test_the_executor_hands_on_good_messages_after_broken_ones(probe):
 def test_a_program_without_diagnostics_logs_a_refusal_at_most_every_two_seconds(probe, monkeypatch):
     node, topic, lines = probe.node, topics.FAULTS, []
     monkeypatch.setattr(type(node.get_logger()), "warning", lambda self, text: lines.append(text))
-    inlet, door = listen(node, topic), Door(node, tells=True)
+    door = Door(node, tells=True)
+    inlet = door.listen(topic)
     for number in range(5):
         door.refuse(inlet, ValueError(f"bad {number}"))
     assert lines == ["/uam/faults: message refused: ValueError: bad 0"]

@@ -15,7 +15,7 @@ from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import PoseWriter, TrajectoryWriter
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.status import ERROR
-from uam_msgs_py.node import polling, sole_publisher
+from uam_msgs_py.node import sole_publisher
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.wiring import READERS, Connections
@@ -90,9 +90,8 @@ class Guarded:
     """A topic of the mission as another node reads it."""
 
     def __init__(self, probe, topic):
-        self.inlet = polling.listen(probe.node, topic, topic.reading, raw=True)
         self.door = Door(probe.node)
-        self.door.guard(self.inlet, topic.name, RightfulNodes(), lambda: True)
+        self.inlet = self.door.listen(topic, topic.reading, True, RightfulNodes(), lambda: True)
         self.guard = self.door.guards[self.inlet]
 
     def read(self):

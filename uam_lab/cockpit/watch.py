@@ -10,7 +10,6 @@ from rclpy.qos import QoSProfile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.door import Door
-from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
 
 # Before the first tick of a simulated flight every publisher of the control loop counts its
@@ -60,10 +59,8 @@ class Watch:
 
     def _listen(self, topic: Topic) -> None:
         qos: QoSProfile = topic.qos if topic in EARLY else topics.NEWEST
-        made = listen(self._node, topic, qos, raw=topic in SERIALIZED)
-        self._subscriptions[topic] = self.door.guard(
-            made, topic.name, self._rightful, lambda: False
-        )
+        raw = topic in SERIALIZED
+        self._subscriptions[topic] = self.door.listen(topic, qos, raw, self._rightful)
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
         """Call show(topic, message) for new messages: all of WHOLE, the newest of the others."""

@@ -17,7 +17,6 @@ from uam_msgs_py.messages.checklist import read_checks
 from uam_msgs_py.messages.navigation import goal_message
 from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
 from uam_msgs_py.node.door import Door
-from uam_msgs_py.node.polling import listen
 from uam_sim_bridge.ports import flights
 
 DECODE: dict[topics.Topic, Callable[[DiagnosticArray], Any]] = {
@@ -65,7 +64,7 @@ class Operator:
         self._executor.add_node(node)
         self._door = Door(node, tells=True)
         self._newest: dict[topics.Topic, Any] = {}  # decoded
-        self._readers = {listen(node, topic): topic for topic in DECODE}
+        self._readers = {self._door.listen(topic): topic for topic in DECODE}
 
     @property
     def place(self) -> str:
@@ -124,7 +123,7 @@ class Operator:
         """Return the estimate of the end effector from now on. Raises NoFlight."""
         topic = topics.END_EFFECTOR
         if topic not in self._readers.values():
-            self._readers[listen(self._node, topic)] = topic
+            self._readers[self._door.listen(topic)] = topic
         self._newest.pop(topic, None)
         return self._latest(topic)
 

@@ -35,7 +35,6 @@ from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.status import OK, WARN, AutopilotState, RadioState, finite
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import unlabelled
-from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
 
 Readers = dict[topics.Topic, Callable[[Any], None]]
@@ -94,8 +93,8 @@ class Feed:
 
     def _listen(self, topic: topics.Topic) -> Subscription:
         fast = topic in self._fast
-        made = listen(self._node, topic, topic.reading if fast else topic.qos, raw=fast)
-        return self.door.guard(made, topic.name, self._rightful, lambda: self._stamp > 0.0)
+        qos = topic.reading if fast else topic.qos
+        return self.door.listen(topic, qos, fast, self._rightful, lambda: self._stamp > 0.0)
 
     @property
     def now(self) -> float:

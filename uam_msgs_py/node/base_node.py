@@ -24,8 +24,8 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import log_callers, polling, process_options, wiring
-from uam_msgs_py.node.door import LOG_PERIOD
+from uam_msgs_py.node import log_callers, process_options, wiring
+from uam_msgs_py.node.door import LOG_PERIOD, Polled
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.health import LoopTime, StampWatch, ages
 from uam_msgs_py.node.joins import StampJoin
@@ -125,7 +125,7 @@ class UamNode(TunableNode):
             callback,
             qos or topic.reading,
             raw=raw,
-            callback_group=polling.Polled(),
+            callback_group=Polled(),
         )
         self.door.guard(made, name, self.rightful, lambda: self.ticks > 0)
         self._stamps.listen(name)

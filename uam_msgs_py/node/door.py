@@ -14,12 +14,15 @@ import traceback
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from uam_control.settings.texts import visible
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import deserialized
+from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
 from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, Taker, complaints, publishers
 
@@ -27,6 +30,21 @@ LOG_PERIOD = 2.0  # s, shortest time between two log lines of one kind
 NAMES_PERIOD = 0.1  # s of wall time between two looks at who publishes a topic
 
 T = TypeVar("T")
+
+
+class Polled(CallbackGroup):
+    """Callback group of subscriptions that no executor serves: it would discard their messages."""
+
+    def can_execute(self, entity: Any) -> bool:
+        """Return False: an executor leaves the entity alone."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Return False, as `can_execute`."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Do nothing: nothing was executed."""
 
 
 class Refusals:
@@ -68,6 +86,25 @@ class Door:
         self._names: dict[str, tuple[float, dict[bytes, str]]] = {}
         self._before: list[str] = []  # complaints at the last news
         self._logged: dict[str, float] = {}
+
+    def listen(
+        self,
+        topic: Topic,
+        qos: QoSProfile | None = None,
+        raw: bool = False,
+        rightful: RightfulNodes | None = None,
+        works: Callable[[], bool] = lambda: False,
+    ) -> Subscription:
+        """Return a subscription whose messages the program takes when it needs them.
+
+        qos: None for the topic's; raw: serialized messages; rightful, works: see `guard`.
+        """
+        made = self._node.create_subscription(
+            *(topic.type, topic.name, lambda _: None, qos or topic.qos),
+            raw=raw,
+            callback_group=Polled(),
+        )
+        return made if rightful is None else self.guard(made, topic.name, rightful, works)
 
     def guard(
         self,

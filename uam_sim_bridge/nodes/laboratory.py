@@ -25,7 +25,6 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, PoseWriter
 from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import polling
 from uam_msgs_py.node.answering import ServingExecutor
 from uam_msgs_py.node.base_node import StopSignal, refuse, run_with
 from uam_msgs_py.node.namespace import frame
@@ -100,8 +99,8 @@ class Rehearsal:
         self._poses: DriverTopic | None = None
         if p.poses == TOPIC:
             self._poses = DriverTopic(node, POSE_DRIVER, topics.MOCAP, PoseWriter())
-        self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
-        self._checklist = polling.listen(node, topics.CHECKLIST)
+        self._mission_topic = node.door.listen(topics.MISSION_STATUS)
+        self._checklist = node.door.listen(topics.CHECKLIST)
         self._confirm = node.create_client(Trigger, "checklist/confirm")
         self._executor = ServingExecutor()
         self._executor.add_node(node)

@@ -30,7 +30,7 @@ from uam_lab.records.recording.logged_topics import LABORATORY_FILE
 from uam_lab.records.results.outcome import Outcome
 from uam_lab.records.results.result_folder import ResultFolder, known_json, write_json
 from uam_msgs_py.messages import topics
-from uam_msgs_py.node import polling, wiring
+from uam_msgs_py.node import wiring
 from uam_msgs_py.node.door import Door
 from uam_sim_bridge.nodes.laboratory import READY
 from uam_sim_bridge.ports import Reservation
@@ -64,8 +64,8 @@ class Starter(threading.Thread):
     def run(self) -> None:
         """Watch the lists, request the start."""
         with self._guest("uam_rehearse") as guest:
-            lists = polling.listen(guest.node, topics.CHECKLIST)
             operator, door = Operator(guest.node), Door(guest.node, tells=True)
+            lists = door.listen(topics.CHECKLIST)
             passed, most = not self._required, -1
             progress, asked = time.monotonic(), 0.0
             while not self._ended.wait(LOOK) and not self.started:

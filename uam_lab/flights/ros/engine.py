@@ -32,7 +32,6 @@ from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import listen
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
@@ -94,7 +93,7 @@ class Waits:
         self._children, self._observer = children, observer
         self._door = listener.door
         self._plant = prefix(listener.node.get_namespace()) + wiring.PLANT
-        self._diagnostics = listen(listener.node, topics.DIAGNOSTICS)
+        self._diagnostics = self._door.listen(topics.DIAGNOSTICS)
         self._patience: dict[str, Patience] = {}  # of the stopped processes
         self._due = self._said = 0.0  # [s] time.monotonic()
 

@@ -36,7 +36,6 @@ from uam_msgs_py.messages.status import WARN, AutopilotState, MissionStatus, dia
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_sim_bridge.ports import Ports
@@ -64,12 +63,10 @@ class StatusListener(Guest):
     ):
         """See `Guest`; publishers: the parameter of that name of the flight's nodes."""
         super().__init__(wiring.FLIGHT, environment, domain, namespace, arguments)
-        self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
-        self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
         rightful = RightfulNodes(self.node.get_namespace(), publishers)
-        self.door = Door(self.node, tells=True)
-        self.door.guard(self._mission, topics.MISSION_STATUS.name, rightful, lambda: False)
-        self.door.guard(self._autopilot, topics.AUTOPILOT_STATE.name, rightful, lambda: False)
+        self.door = door = Door(self.node, tells=True)
+        self._mission = door.listen(topics.MISSION_STATUS, EVERY_STATUS, rightful=rightful)
+        self._autopilot = door.listen(topics.AUTOPILOT_STATE, rightful=rightful)
         self._state = AutopilotState()
         self._heard = False  # whether the autopilot's state is known
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
@@ -120,7 +117,7 @@ class ChangedParameters:
 
     def __init__(self, node: Node, door: Door) -> None:
         """door: of the node."""
-        self._subscription, self._door = listen(node, topics.CHANGES), door
+        self._subscription, self._door = door.listen(topics.CHANGES), door
         self._namespace = node.get_namespace()
         self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
 

@@ -28,7 +28,6 @@ from uam_lab.records.results.result_folder import ResultFolder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.namespace import prefix
-from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.wiring import Connections
 from uam_sim_bridge.ports import Reservation
 
@@ -82,7 +81,7 @@ class VehicleCourse(Course):
     def begin(self) -> None:
         """Listen to the diagnostics."""
         node = self.listener.node
-        self._diagnostics = listen(node, topics.DIAGNOSTICS)
+        self._diagnostics = self.listener.door.listen(topics.DIAGNOSTICS)
         self._connections = Connections(node, spun=False)
         self._prefix = prefix(node.get_namespace())
 

@@ -39,7 +39,6 @@ from uam_msgs_py.messages.serialized import deserialized, type_name
 from uam_msgs_py.messages.tf_message import read_transforms, transforms_message
 from uam_msgs_py.node.door import Door
 from uam_msgs_py.node.namespace import expanded, prefix
-from uam_msgs_py.node.polling import listen
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.sole_publisher import UNKNOWN, Taker, publishers
 
@@ -165,27 +164,28 @@ class TopicRecorder:
         self.door = Door(node)
         self._node, self._rightful = node, rightful
         self._offers = CoreOffers()
-        self._tracks = [self._track(node, topic) for topic in chosen]
+        self._tracks = [self._track(topic) for topic in chosen]
         # /clock is taken last in each poll: then every /clock published before any other message
         # of this poll is available
         self._tracks.sort(key=lambda track: track.topic == topics.CLOCK.name)
         self._clock_wall: list[int] = []  # publisher's wall clock of each /clock [ns]
         self._clock_sim: list[int] = []
 
-    def _track(self, node: Node, topic: topics.Topic) -> Track:
+    def _track(self, topic: topics.Topic) -> Track:
         qos = QoSProfile(
             history=QoSHistoryPolicy.KEEP_LAST,
             depth=DEPTH,
             reliability=topic.reading.reliability,
             durability=topic.qos.durability,
         )
-        subscription = listen(node, topic, qos, raw=True)
         name = expanded(self._namespace, topic.name)
         self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
         channel = add_topic(self.log, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
         # a foreign message would be a row of the table
-        self.door.guard(subscription, topic.name, self._rightful, lambda: self._clock_sim != [])
+        subscription = self.door.listen(
+            topic, qos, True, self._rightful, lambda: self._clock_sim != []
+        )
         guard, taker = self.door.guards.get(subscription), self.door.taker(subscription)
         read, take = (_reader(topic), taker.take) if guard is None else (None, guard.take)
         own = own_part(topic, self._namespace)
