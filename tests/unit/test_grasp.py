@@ -10,6 +10,7 @@ import pytest
 
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
+from uam_control.grasp.alignment import Alignment
 from uam_control.grasp.evidence import (
     Load,
     by_mass,
@@ -255,6 +256,19 @@ def test_a_payload_beside_its_place_is_met():
     assert flight.until(36.0)[-1] is Grasp.APPROACHED
     assert np.hypot(*(flight.tool() - flight.payload)[:2]) < 0.003
     assert flight.until()[-1] is Grasp.RELEASED
+
+
+@pytest.mark.parametrize("shifting", [False, True])
+def test_a_correction_waits_for_the_last_one(shifting):
+    """On its way the path is not where the last correction leads: twice would be too far."""
+    scenario, alignment = load_scenario("pick_and_place"), Alignment()
+    (window,) = grasp_windows(scenario.moves, scenario.magnet)
+    for k in range(300):
+        tool = np.array([0.0, 0.0, 0.1])
+        sight = Sight(0.01 * k, 0.0, tool, payload=np.zeros(3), shifting=shifting)
+        alignment.add(sight, window)
+    shift = np.zeros(3)
+    assert (alignment.correction(shift, P) is shift) == shifting
 
 
 def test_a_missed_payload_is_approached_again():

@@ -33,7 +33,7 @@ class Alignment:
         self._distance, self._constant = RunningMean(), RunningMean()
         self._stamp = 0.0
         self._corrected: float | None = None  # stamp [s] of the last correction
-        self._tracked = False
+        self._tracked = self._shifting = False
         self._axes = FROM_ABOVE.axes
 
     def restart(self) -> None:
@@ -48,7 +48,7 @@ class Alignment:
         if sight.tracked != self._tracked:
             self.restart()
             self._tracked = sight.tracked
-        self._stamp = sight.stamp
+        self._stamp, self._shifting = sight.stamp, sight.shifting
         if sight.tracked:
             way = sight.tool + sight.ahead - sight.payload - window.back
             away = self._axes @ way
@@ -105,7 +105,7 @@ class Alignment:
         It is the same if no correction is due, or the correction is below `worth` [m].
         """
         settled = self._corrected is None or self._stamp - self._corrected >= PAUSE
-        if not (self._tracked and settled and self.known):
+        if self._shifting or not (self._tracked and settled and self.known):
             return shift
         away = self._constant.mean + [0.0, 0.0, p.press_depth]
         if float(np.max(np.abs(away))) < worth:

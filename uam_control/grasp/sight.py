@@ -38,6 +38,7 @@ class Sight:
     on_path: bool = True  # whether it flies on the path, and not on its way back to it
     tool_then: np.ndarray | None = None  # (3,) at the stamp of the payload's pose; None: tool
     ahead: np.ndarray = field(default_factory=lambda: np.zeros(3))  # way until descent
+    shifting: bool = False  # whether the path is still on its way to the last correction
     opening: float = math.nan  # [m] of fingers
     squeeze: float = math.nan  # [N] of fingers
 

@@ -179,6 +179,7 @@ class PayloadWatch:
             throttle=readings.throttle,
             lever=float(levers[self._loaded]),
             on_path=not self._guidance.coming_back,
+            shifting=not self.shift.settled,
         )
         sight.opening, sight.squeeze = readings.grip.tolist()
         if self._hand and -AHEAD <= readings.payload_age <= p.payload_age:
