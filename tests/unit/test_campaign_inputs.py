@@ -100,3 +100,12 @@ def test_ctrl_c_says_what_continues(tmp_path, capsys, monkeypatch):
     assert main(["campaign", "--flights", "2", "--out", str(out)]) == 130
     said = f"uam campaign: interrupted; the same command with --out {out} continues\n"
     assert capsys.readouterr().err.endswith(said)
+
+
+@pytest.mark.parametrize("command", ["campaign", "compare", "faults"])
+def test_a_scenario_beyond_the_limits_is_refused_before_any_flight(command, tmp_path, capsys):
+    out = tmp_path / "out"
+    more = ["--matrix", "random", "--draws", "2"] if command == "faults" else []
+    assert main([command, "--scenario", "race_10", "--out", str(out), *more]) == 2
+    assert "scenario race_10: x 13.5 m exceeds 5 m at 10.7 s" in capsys.readouterr().err
+    assert not out.exists()

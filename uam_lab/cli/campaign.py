@@ -25,7 +25,6 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import (
@@ -36,7 +35,7 @@ from uam_lab.cli.command import (
     given_profile,
     place_of,
 )
-from uam_lab.experiments.trials.trial import Trial, TrialResult, result_rows
+from uam_lab.experiments.trials.trial import Trial, TrialResult, feasible, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_settings import SettingsError
 from uam_lab.records.results.result_folder import make_folder
@@ -65,8 +64,8 @@ def run(options: argparse.Namespace) -> int:
 
     place = place_of(options)
     vehicle = load_description(options.vehicle)
-    load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     profile = given_profile(options.profile, vehicle)
+    feasible(options.scenario, profile)
     options.ranges = options.ranges or usual_ranges(options.plant_preset)
     allowed = ranges(configuration.named("campaign", options.ranges))
     effects = chosen_effects(options)

@@ -19,7 +19,6 @@ The baselines are reconstructions (docs/law.md). The same command gives the same
 import argparse
 
 from uam_control.laws import catalogue
-from uam_control.mission import load_scenario
 from uam_control.mission.scenarios.environment import HEAVIEST
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
@@ -27,7 +26,7 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.cli.command import Command, chosen_effects, count, number, place_of
 from uam_lab.experiments.compare import plan
-from uam_lab.experiments.trials.trial import TrialResult, result_rows
+from uam_lab.experiments.trials.trial import TrialResult, feasible, result_rows
 from uam_lab.flights.conclude import command_line
 from uam_lab.flights.flight_options import ENGINES
 from uam_lab.flights.flight_settings import require_ros
@@ -72,12 +71,13 @@ def run(options: argparse.Namespace) -> int:
     place, payloads = place_of(options), tuple(options.payload_mass or plan.PAYLOADS)
     vehicle = load_description(options.vehicle)
     scenario = options.scenario
-    load_scenario(scenario, vehicle)  # an invalid one is refused before any flight
     rows = plan.entries(options.rows or tuple(plan.ROWS), vehicle)
     for text in options.profile:
         label, profile = _further(text, vehicle)
         if rows.setdefault(label, profile) is not profile:
             raise ConfigurationError(f"--profile {text}: the row {label} is there already")
+    for profile in rows.values():
+        feasible(scenario, profile)
     effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)

@@ -26,7 +26,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.cli.command import (
@@ -86,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.experiments.faults.trial import ROWS, FaultTrial
     from uam_lab.experiments.trials.carried import inputs
     from uam_lab.experiments.trials.experiment import TABLE, Experiment
+    from uam_lab.experiments.trials.trial import feasible
 
     place = place_of(options)
     check_clock(options.engine, options.clock)
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
         say(f"left out: {name}: {why}")
     cells = matrix.cells(options.seed, options.repeat)
     kind = "cables" if rehearsed else "faults"
-    mass = load_scenario(matrix.scenario, vehicle).payload_mass
+    mass = feasible(matrix.scenario, profile).payload_mass
     changes = presets.added({}, chosen_effects(options))
     out = make_folder(options.out, kind)
     flight = partial(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ALPHA, coordinates
-from uam_control.mission import Scenario, load_scenario
+from uam_control.mission import Feasibility, Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.experiments.trials.carried import Carried
 from uam_lab.experiments.trials.outcome import Ended, classify, explained
@@ -53,10 +53,12 @@ class Trial:
 
     @cached_property
     def flown_scenario(self) -> Scenario:
-        """The scenario, for the vehicle; it is read once. Raises ScenarioError."""
+        """The scenario as `uam fly` flies it; it is read once. Raises ScenarioError."""
         if self.carried is not None and self.carried.scenario is not None:
-            return self.carried.scenario
-        return load_scenario(self.scenario, self.profile.vehicle)
+            read = self.carried.scenario
+        else:
+            read = load_scenario(self.scenario, self.profile.vehicle)
+        return _limits(read, self.profile).fitted(read)
 
     def settings(self, **more: Any) -> FlightSettings:
         """Return the settings of the flight for an engine of `uam fly`; more: further ones."""
@@ -96,6 +98,21 @@ class TrialResult(Ended):
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries of rms and largest."""
         return coordinates(len(self.rms) - ALPHA)
+
+
+def feasible(name: str, profile: Profile) -> Scenario:
+    """Return the scenario `name` (or file) of flights with this profile, before any is flown.
+
+    Raises ScenarioError; InfeasibleReference if it exceeds a limit, as `uam fly`.
+    """
+    found = load_scenario(name, profile.vehicle)
+    limits = _limits(found, profile)
+    limits.check(limits.fitted(found))
+    return found
+
+
+def _limits(scenario: Scenario, profile: Profile) -> Feasibility:
+    return Feasibility(profile.vehicle, profile.sets["mission"], scenario.payload_mass)
 
 
 def fly(trial: Trial, change: Callable[[DirectFlight], None] | None = None) -> Outcome:
