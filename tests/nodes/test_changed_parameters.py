@@ -12,6 +12,7 @@ from uam_lab.flights.ros.supervise import ChangedParameters, StatusListener
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.flight_events import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.node.door import Door
 
 
 class Silent:
@@ -26,7 +27,7 @@ class Silent:
 
 @pytest.mark.parametrize("namespace", ["/", "/uav1"])
 def test_the_newest_accepted_values_come_back_as_ros_arguments(namespace, tmp_path):
-    changed = ChangedParameters(Silent(), None)
+    changed = ChangedParameters(Silent(), Door(Silent()))
     assert changed.arguments("arm_controller") == []
     for values, reason in (
         ({"rho_0": (1.0, 2.5), "phi": ([1.0, 1.0], [1e-7, 3.0])}, ""),
