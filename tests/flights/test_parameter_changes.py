@@ -119,7 +119,7 @@ def test_five_hundred_changes_in_a_flight(fly):
         node = generator.choice(NODES)
         kind = valid if generator.random() < 0.6 else invalid
         requests.append((node, *kind(generator, sets[node])))
-    flight = fly("--scenario", "hover", report=True)
+    flight = fly("--scenario", "hover_60", report=True)
     flight.until(lambda: "ROS domain" in flight.said, "started")
     domain = int(flight.said.split("ROS domain ")[1].split(",")[0])
     with Guest("tuner", transport_environment(), domain) as guest:
