@@ -24,7 +24,7 @@ from uam_msgs_py.node.door import Door
 
 NODES = ("position_controller", "attitude_controller", "arm_controller", "state_estimator")
 COUNT = 500
-ANSWER_TIME = 0.1  # [s] of simulated time
+ANSWER_TIME = 0.25  # [s] of simulated time
 
 
 def valid(generator, kept):
@@ -166,7 +166,7 @@ def test_five_hundred_changes_in_a_flight(fly):
         for stamp, change in reported
         if sent[change.node]
     ]
-    # The nodes look at least every 0.02 s; how long a request is under way is up to the machine.
+    # A node looks for changes five times a second, see `OtherEntities`.
     figures = [round(float(np.percentile(late, part)), 3) for part in (50, 90, 99, 100)]
     print(f"simulated seconds from request to effect, 50, 90, 99, 100 %: {figures}")
     assert figures[0] < ANSWER_TIME, figures
