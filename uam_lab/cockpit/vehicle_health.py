@@ -9,7 +9,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.supervision import PreflightCheck, State
-from uam_control.supervision.states import STOPPED_STATES
 from uam_control.supervision.supervision_parameters import SupervisionLimits
 from uam_msgs_py.messages.status import (
     ERROR,
@@ -114,7 +113,7 @@ class Health:
             return BAD, mission.state, mission.cause
         if mission.abort_reason:
             return BAD, mission.phase, mission.abort_reason
-        if mission.state in [state.value for state in STOPPED_STATES]:
+        if mission.level == WARN:
             return CAUTION, mission.state, mission.cause
         return GOOD, mission.phase, ""
 

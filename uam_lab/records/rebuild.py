@@ -46,10 +46,10 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     outcome = read_flight(log, flown, vehicle=vehicle)
     numbers = known_json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
-    latency, missed = outcome.latency_s, outcome.missed_ticks
     outcome.wall_s = numbers.get("wall_s") or before.get("wall_s") or outcome.wall_s
-    outcome.latency_s = numbers.get("latency_s", latency) if realtime else None
-    outcome.missed_ticks = numbers.get("missed_ticks", missed) if realtime else None
+    outcome.latency_s = numbers.get("latency_s", outcome.latency_s) if realtime else None
+    missed = numbers.get("missed_ticks", outcome.missed_ticks)
+    outcome.missed_ticks = missed if realtime else None
     earlier = [note for note in before.get("notes") or [] if not note.startswith(PARTIAL)]
     outcome.notes = list(dict.fromkeys([*earlier, *outcome.notes]))
     if not outcome.done:

@@ -19,7 +19,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from uam_lab.experiments.trials.carried import inputs
-from uam_lab.experiments.trials.trial import feasible, measure
+from uam_lab.experiments.trials.trial import measure
 from uam_lab.experiments.tuning.front import SMALL, delay_margin, hypervolumes, improvement
 from uam_lab.experiments.tuning.space import Space, TuningError
 from uam_lab.experiments.workers.identity import difference
@@ -59,7 +59,8 @@ def open_storage(where: str) -> JournalStorage | RDBStorage:
 def open_study(task: Task) -> optuna.Study:
     """Open the study, a new one if there is none. Raises TuningError."""
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    warnings.filterwarnings("ignore", module="optuna")
+    for kind in (FutureWarning, optuna.exceptions.ExperimentalWarning):
+        warnings.filterwarnings("ignore", category=kind, module="optuna")
     space = task.space
     if space.delay_margin is None:
         directions = ["minimize"]
@@ -89,7 +90,6 @@ def problem(space: Space) -> dict[str, str]:
         "profile": (start.sets, start.bridge()),
     }
     for scenario in sorted({trial.scenario for trial in space.trials(start)}):
-        feasible(scenario, start)
         found |= inputs(start.vehicle, scenario, further)
         found[f"scenario {scenario}"] = found.pop("scenario")
     return found

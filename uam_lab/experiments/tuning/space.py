@@ -11,7 +11,7 @@ from uam_control.settings import configuration
 from uam_control.settings.parameter_set import TINY, Bound, ParameterSet
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription
-from uam_lab.experiments.trials.trial import Trial, TrialResult
+from uam_lab.experiments.trials.trial import Trial, TrialResult, feasible
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 
@@ -137,7 +137,7 @@ def load_space(
     """Read a file of config/tuning, or another one.
 
     start: None for the vehicle's profile of the file's law; vehicle: None for the default one.
-    Raises TuningError, ProfileError, ConfigurationError; one line each.
+    Raises TuningError, ProfileError, ScenarioError, ConfigurationError; one line each.
     """
     file = configuration.named("tuning", name_or_file)
     top = read_section(file, TuningError)
@@ -158,6 +158,8 @@ def load_space(
     top.only_asked()
     if len(space.start_values) < len(space.knobs):
         raise TuningError(f"{file}: knobs: the same entries of a parameter twice")
+    for scenario in {trial.scenario for trial in space.trials(start)}:
+        feasible(scenario, start)
     return space
 
 
