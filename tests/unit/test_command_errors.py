@@ -4,13 +4,20 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from argparse import Namespace
+from pathlib import Path
 
 import pytest
 
+from uam_control import executables
+from uam_control.executables import interrupt
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.cli.main import interrupt, main
+from uam_lab.cli.main import main
 from uam_lab.cli.parser import run
+
+ROOT = Path(__file__).resolve().parents[2]
+ENTRY = "uam_control.executables:main"
 
 
 def test_an_error_of_the_project_or_the_system_is_one_line(capsys):
@@ -83,6 +90,33 @@ def test_ctrl_c_that_a_compilation_would_lose_comes_behind_it():
     finally:
         signal.signal(signal.SIGINT, before)
     assert passed == ["whole"]
+
+
+def test_ctrl_c_while_a_node_loads_ends_it_without_a_word():
+    program = """
+import importlib, sys, time
+from uam_control.executables import main
+
+def load(module):
+    print(module, flush=True)
+    time.sleep(20.0)
+
+importlib.import_module, sys.argv = load, ["bin/position_controller"]
+main()
+"""
+    node = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert node.stdout.readline() == "uam_control.nodes.position_controller\n"
+    node.send_signal(signal.SIGINT)
+    assert node.communicate(timeout=20.0) == ("", "")
+    assert node.returncode == -signal.SIGINT
+
+
+def test_every_executable_has_its_module():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    scripts = {name for name, entry in project["scripts"].items() if entry == ENTRY}
+    assert scripts == executables.MODULES.keys() == project["scripts"].keys() - {"uam"}
 
 
 def test_an_empty_name_is_not_the_present_folder(capsys):

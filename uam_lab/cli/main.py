@@ -10,14 +10,12 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from types import FrameType
 
+from uam_control.executables import interrupt
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 
 UTF_8 = "PYTHONUTF8"  # variable of Python
 WITHOUT_NODES = {"-h", "--help", "direct", "--engine=direct"}
-COMPILING = "_raw_object_cache_notify"  # of llvmlite: LLVM calls it, an exception in it is lost
-AGAIN = 0.02  # [s]
 _early = contextlib.ExitStack()  # ends what began before the command
 
 
@@ -71,16 +69,6 @@ def _ended_by_interrupt() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def interrupt(_: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt; within a function that would lose it, a moment later."""
-    while frame is not None and frame.f_code.co_name != COMPILING:
-        frame = frame.f_back
-    if frame is None:
-        raise KeyboardInterrupt
-    here = threading.main_thread().ident
-    threading.Timer(AGAIN, signal.pthread_kill, (here, signal.SIGINT)).start()
 
 
 def _end(*_: object) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import yaml
 
+from uam_control import executables
 from uam_control.mission.time_limit import time_limit
 from uam_control.profiles.profile import servo_mode
 from uam_control.settings.atomic import write_text
@@ -27,19 +28,22 @@ from uam_sim_bridge.px4 import px4_parameters
 
 # Executable → module. Started and, at the end, stopped in this order, the recorder last.
 MODULES = {
-    wiring.RECORDER: "uam_lab.records.recorder",
-    wiring.PLANT: "uam_sim_bridge.nodes.mujoco_sim",
-    wiring.ESTIMATOR: "uam_control.nodes.state_estimator",
-    wiring.MISSION: "uam_control.nodes.mission",
-    wiring.POSITION: "uam_control.nodes.position_controller",
-    wiring.ATTITUDE: "uam_control.nodes.attitude_controller",
-    wiring.ARM: "uam_control.nodes.arm_controller",
-    wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
-    wiring.SCENE: "uam_lab.cockpit.scene",
-    wiring.COCKPIT: "uam_lab.cockpit.cockpit_node",
+    name: executables.MODULES[name]
+    for name in (
+        wiring.RECORDER,
+        wiring.PLANT,
+        wiring.ESTIMATOR,
+        wiring.MISSION,
+        wiring.POSITION,
+        wiring.ATTITUDE,
+        wiring.ARM,
+        wiring.BRIDGE,
+        wiring.SCENE,
+        wiring.COCKPIT,
+    )
 }
-FUSED = "uam_sim_bridge.nodes.flight_controller"
-WHOLE_BODY = "uam_control.nodes.whole_body_controller"
+FUSED = executables.MODULES[wiring.FLIGHT_CONTROLLER]
+WHOLE_BODY = executables.MODULES[wiring.WHOLE_BODY]
 # process of several nodes → its module, its nodes
 HOSTS = {
     wiring.FLIGHT_CONTROLLER: (FUSED, wiring.FUSED),

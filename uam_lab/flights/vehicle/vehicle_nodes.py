@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from uam_control.executables import MODULES
 from uam_control.offboard.autopilot_magnet import NONE
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import POSITION_SERVO
@@ -17,9 +18,7 @@ from uam_msgs_py.node import wiring
 CHECKLIST = wiring.CHECKLIST
 CHECKLIST_RECORD = "checklist.json"  # in the result folder
 DRIVERS = {
-    wiring.MOCAP_DRIVER: "uam_sim_bridge.nodes.mocap_driver",
-    wiring.ARM_DRIVER: "uam_sim_bridge.nodes.arm_driver",
-    wiring.MAGNET_DRIVER: "uam_sim_bridge.nodes.magnet_driver",
+    name: MODULES[name] for name in (wiring.MOCAP_DRIVER, wiring.ARM_DRIVER, wiring.MAGNET_DRIVER)
 }
 WAITS = {"wait_for_device": True}  # of a driver
 STATE_TIMEOUT = 1.0  # [s] without a state in flight, as `release_time` of the bridge
@@ -35,7 +34,7 @@ def modules(lab: Lab) -> dict[str, str]:
     if lab.magnet.through != GPIO:
         del drivers[wiring.MAGNET_DRIVER]
     recorder = {wiring.RECORDER: stack.pop(wiring.RECORDER)}
-    return recorder | drivers | stack | {CHECKLIST: "uam_lab.preflight.checklist_node"}
+    return recorder | drivers | stack | {CHECKLIST: MODULES[CHECKLIST]}
 
 
 def processes(lab: Lab) -> dict[str, str]:
