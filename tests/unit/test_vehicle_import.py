@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from imported_vehicle import imported, posed, write
-from urdf_texts import FINGERS, SECOND_ARM, drone, joint
+from urdf_texts import FINGERS, SECOND_ARM, drone, inertial, joint
 
 from uam_control.arm.hand import hinge_angles
 from uam_control.settings.configuration import path
@@ -121,6 +121,18 @@ def test_rotors_of_a_coaxial_octocopter_turn_against_each_other(tmp_path):
     around = sorted(top, key=lambda one: math.atan2(one.position[1], one.position[0]))
     turns = [one.counter_clockwise for one in around]
     assert turns in ([True, False] * 2, [False, True] * 2)
+
+
+def test_what_holds_a_rotor_is_none(tmp_path):
+    """aerial_gym's vehicles have an arm_motor_0, lying, beside each motor_0."""
+    arms = "".join(
+        f'<link name="arm_rotor_{i}">{inertial(0.01, 0.05)}</link>'
+        + joint(f"arm_{i}", "base_link", f"arm_rotor_{i}", "0 0.09 0.05", "fixed", "1.5708 0 0")
+        for i in range(4)
+    )
+    made, _ = imported(tmp_path, drone().replace("</robot>", f"{arms}</robot>"))
+    places = [one.position[:2] for one in made.description.rotors]
+    assert [math.hypot(*place) for place in places] == pytest.approx([0.25] * 4, 1e-3)
 
 
 def test_three_rotors_are_not_replaced_by_four_of_a_layout(tmp_path):

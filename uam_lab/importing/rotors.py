@@ -13,6 +13,7 @@ from uam_lab.importing.source import RotorFacts, Source
 
 NAMES = (r"rotor", r"prop(eller)?(?!rio)", r"motor|thrust")
 ANY = re.compile("|".join(NAMES), re.I)
+HOLDER = re.compile(r"arm|mount|holder|guard|boom|duct", re.I)  # of a rotor, as in arm_motor_0
 FEWEST, MOST = 4, 12
 ONE_PLACE = 0.03  # [m] across, within which rotors are above each other
 TURNS = ((True, re.compile(r"(^|[^a-z])ccw", re.I)), (False, re.compile(r"(^|[^a-z])cw", re.I)))
@@ -92,6 +93,8 @@ def find_rotors(
             for b in bodies
             if b != base and any(re.search(pattern, one, re.I) for one in _names(model, b))
         ]
+        bare = [b for b in named if not HOLDER.search(model.body(b).name)]
+        named = bare if len(bare) >= FEWEST else named
         found = [
             rotor(model.body(b).name, _centre(model, data, b, origin), _spin(model, data, b), b)
             for b in named
