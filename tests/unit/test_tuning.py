@@ -171,6 +171,19 @@ def test_ctrl_c_says_how_the_search_goes_on(tmp_path, capsys, monkeypatch):
     assert "the same command continues the search" in capsys.readouterr().err
 
 
+def test_a_storage_that_cannot_go_on_is_refused_in_one_line(tmp_path, capsys):
+    file, out = write(tmp_path), tmp_path / "out"
+    out.mkdir()
+    journal = out / "study.journal"
+    open_study(Task(load_space(file), "another", str(journal), 1, 1))
+    assert main(["tune", "--space", file, "--out", str(out)]) == 2
+    assert capsys.readouterr().err.endswith("has the study another: give another --out\n")
+    journal.write_bytes(journal.read_bytes()[:-9])  # as of a search that was killed
+    assert main(["tune", "--space", file, "--out", str(out)]) == 2
+    complaint = "study.journal: its last line was not written to its end: remove it\n"
+    assert capsys.readouterr().err.endswith(complaint)
+
+
 @pytest.mark.long
 def test_a_start_whose_evaluation_was_killed_is_evaluated_again(tmp_path, capsys):
     file, out = write(tmp_path), tmp_path / "out"

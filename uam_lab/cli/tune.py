@@ -73,6 +73,7 @@ def run(options: argparse.Namespace) -> int:
         curve,
         evaluated_start,
         open_study,
+        refuse_other_study,
         search,
     )
 
@@ -96,6 +97,8 @@ def run(options: argparse.Namespace) -> int:
         options.step,
         options.patience or 0,
     )
+    if options.storage is None:
+        refuse_other_study(task)
     prepare(print)
     status = 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import optuna
 from optuna.storages import JournalStorage, RDBStorage
@@ -51,9 +52,12 @@ def open_storage(where: str) -> JournalStorage | RDBStorage:
     try:
         if "://" in where:
             return RDBStorage(where, heartbeat_interval=60)
-        return JournalStorage(JournalFileBackend(where))
+        found = JournalStorage(JournalFileBackend(where))
     except Exception as error:  # drivers of databases raise different types
         raise TuningError(f"storage {where}: {str(error).splitlines()[0]}") from None
+    if Path(where).read_bytes()[-1:] not in (b"", b"\n"):  # Optuna would append to it
+        raise TuningError(f"storage {where}: its last line was not written to its end: remove it")
+    return found
 
 
 def open_study(task: Task) -> optuna.Study:
@@ -80,6 +84,13 @@ def open_study(task: Task) -> optuna.Study:
         directions=directions,
         load_if_exists=True,
     )
+
+
+def refuse_other_study(task: Task) -> None:
+    """Raise TuningError if the storage, which is that of one result folder, has another study."""
+    for name in optuna.get_all_study_names(open_storage(task.storage)):
+        if name != task.study:
+            raise TuningError(f"{task.storage} has the study {name}: give another --out")
 
 
 def problem(space: Space) -> dict[str, str]:
@@ -112,7 +123,7 @@ def _begin(study: optuna.Study, space: Space) -> None:
         changed = difference(before, own) if isinstance(before, dict) else "an earlier version"
         raise TuningError(
             f"study {study.study_name} has evaluations with other inputs ({changed}): undo the "
-            "change, or give another --out or --study"
+            "change, or give another --out, with --storage another --study"
         )
     study.set_user_attr(PROBLEM, own)
     waiting = study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
