@@ -135,6 +135,23 @@ def test_what_holds_a_rotor_is_none(tmp_path):
     assert [math.hypot(*place) for place in places] == pytest.approx([0.25] * 4, 1e-3)
 
 
+def test_an_answer_counts_more_than_the_file(tmp_path):
+    """Of a file's 8.1 N; a menagerie's multicopter had 200 N per rotor to play with."""
+    plugins = "".join(GAZEBO.format(i=i, turn="cw" if i % 2 else "ccw") for i in range(4))
+    text = drone().replace("</robot>", f"{plugins}</robot>")
+    given = {"rotors.thrust_max": "6.5", "rotors.layout": "quad_x", "rotors.distance": 0.2}
+    made, _ = imported(tmp_path, text, answers=Answers({"rotors.thrust_max": "6.5"}))
+    assert made.description.rotor.thrust_max == pytest.approx(6.5, rel=1e-4)
+    made, _ = imported(tmp_path, text, answers=Answers(given))
+    places = [one.position[:2] for one in made.description.rotors]
+    assert [math.hypot(*place) for place in places] == pytest.approx([0.2] * 4, 1e-3)
+
+
+def test_an_answer_of_no_use_is_told(tmp_path):
+    made, _ = imported(tmp_path, drone(), answers=Answers({"rotors.distance": 0.2}))
+    assert "answer rotors.distance: of no use for this vehicle" in made.missing
+
+
 def test_three_rotors_are_not_replaced_by_four_of_a_layout(tmp_path):
     """Unless the user asks for one; the fourth is on the place of the third."""
     text = re.sub(

@@ -45,9 +45,22 @@ class Answers:
         for key in self.given:
             if key not in self._questions:
                 raise ImportRefused(f"answers: {key}: {unknown(key, self._questions)}")
+        self.unused = set(self.given)  # of what has not been needed so far
 
-    def number(self, key: str, usual: float, why: str, high: float = math.inf) -> Told:
-        """Return a positive number of at most `high`; usual: what is assumed, why."""
+    def number(
+        self,
+        key: str,
+        usual: float,
+        why: str,
+        high: float = math.inf,
+        known: Told | None = None,
+    ) -> Told:
+        """Return a positive number of at most `high`.
+
+        usual: what is assumed, why; known: by the file, asked only if the user has answered.
+        """
+        if known is not None and key not in self.given:
+            return known
         usual = float(f"{usual:.4g}")
         given = self._answer(key, usual)
         if given is None:
@@ -84,6 +97,7 @@ class Answers:
         return Told(names * (count // len(names)), ASKED)
 
     def _answer(self, key: str, usual: Any) -> Any:
+        self.unused.discard(key)
         if key in self.given or self.ask is None:
             return self.given.get(key)
         what, unit = self._questions[key]

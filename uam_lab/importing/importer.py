@@ -77,6 +77,7 @@ def import_vehicle(
     description = load_description(written)
     Vehicle.of(description).compile(0.0)
     found = tuple(_found(parts, stance, mount))
+    parts.notes += [f"answer {key}: of no use for this vehicle" for key in sorted(answers.unused)]
     missing = (*parts.source.notes, *parts.notes, *_assumed(tree_of_numbers))
     if stance.legs.value:
         missing += (f"landing gear: {stance.legs}",)

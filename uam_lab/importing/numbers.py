@@ -47,7 +47,7 @@ def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
     curve = answers.assumed.number("curve_factor")
 
     def told(name: str, usual: float, why: str) -> Told:
-        return _known(parts, name) or answers.number(f"rotors.{name}", usual, why)
+        return answers.number(f"rotors.{name}", usual, why, known=_known(parts, name))
 
     return {
         "layout": layout,
@@ -64,7 +64,8 @@ def rotor_numbers(parts: Parts, answers: Answers, mass: float) -> Tree:
 
 def _layout(parts: Parts, answers: Answers) -> list[Tree]:
     """Return name, position and direction of each rotor, by a layout if the file has none."""
-    laid = None if parts.rotors else _lay_out(parts, answers)
+    found = parts.rotors and "rotors.layout" not in answers.given
+    laid = None if found else _lay_out(parts, answers)
     turn, why = rotors.turns(parts.rotors)
     origin = (ASSUMED, why) if why else (FILE, "")
     entries = []
@@ -80,10 +81,13 @@ def _layout(parts: Parts, answers: Answers) -> list[Tree]:
 def _radius(parts: Parts, answers: Answers) -> Told:
     gap = rotors.neighbours(np.array([one.position for one in parts.rotors]))
     shown = max(one.radius for one in parts.rotors)
-    if 0.0 < shown < WIDEST * gap:
-        return Told(float(f"{shown:.4g}"), DERIVED, "half width of the rotor's shape")
-    usual = answers.assumed.number("radius_per_gap") * gap
-    return answers.number("rotors.radius", usual, "from neighbours' distance")
+    known = Told(float(f"{shown:.4g}"), DERIVED, "half width of the rotor's shape")
+    return answers.number(
+        "rotors.radius",
+        answers.assumed.number("radius_per_gap") * gap,
+        "from neighbours' distance",
+        known=known if 0.0 < shown < WIDEST * gap else None,
+    )
 
 
 def _thrust(parts: Parts, answers: Answers, mass: float, radius: float) -> tuple[Told, Told]:
@@ -91,9 +95,8 @@ def _thrust(parts: Parts, answers: Answers, mass: float, radius: float) -> tuple
     assumed, weight = answers.assumed, mass * GRAVITY
     ratio = assumed.number("thrust_to_weight")
     why = f"{ratio:g} times the weight of {weight:.3g} N"
-    thrust = _known(parts, "thrust_max") or answers.number(
-        "rotors.thrust_max", ratio * weight / len(parts.rotors), why
-    )
+    share, known = ratio * weight / len(parts.rotors), _known(parts, "thrust_max")
+    thrust = answers.number("rotors.thrust_max", share, why, known=known)
     usual = float(f"{assumed.number('tip_speed') / radius:.4g}")
     speed = _known(parts, "speed_max") or Told(usual, ASSUMED, "tip speed as of the S-500")
     coefficient = float(f"{thrust.value / speed.value**2:.5g}")
@@ -137,6 +140,7 @@ def _lay_out(parts: Parts, answers: Answers) -> Told:
     count, levels = chosen.whole("places"), chosen.whole("levels")
     first = math.radians(chosen.number("first_deg"))
     where = str(parts.source.file)
+    parts.rotors.clear()
     for i in range(count):
         angle = first - 2.0 * math.pi * i / count
         for level in range(levels):
