@@ -417,6 +417,7 @@ def test_a_drone_without_an_arm_gets_that_of_another_vehicle(tmp_path):
     made, _ = imported(tmp_path, drone(arm=False), arm_of=other)
     assert made.description.joint_names == other.joint_names
     assert made.description.servos == other.servos
+    assert made.description.stowed == pytest.approx(other.stowed)  # where its scenarios begin
     for mine, theirs in zip(made.description.joints, other.joints, strict=True):
         assert (mine.low, mine.high) == pytest.approx((theirs.low, theirs.high), abs=1e-3)
 

@@ -62,7 +62,7 @@ def import_vehicle(
             f"--arm-of {DEFAULT_VEHICLE} hangs that vehicle's below it"
         )
     geometry.refuse_units(parts)
-    stance = stand(parts, answers)
+    stance = stand(parts, answers, None if arm_of is None else arm_of.stowed)
     if arm_of is None:
         servos = numbers.servos_for(parts, answers, numbers.masses(parts))
     else:

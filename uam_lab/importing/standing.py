@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,13 +33,21 @@ class Stance:
     height: float  # [m] of the base
 
 
-def stand(parts: Parts, answers: Answers) -> Stance:
-    """Return how the vehicle stands; the model is left with all joints at zero."""
+def stand(parts: Parts, answers: Answers, usual: Sequence[float] | None = None) -> Stance:
+    """Return how the vehicle stands; the model is left with all joints at zero.
+
+    usual: how the arm is stowed (n,) [rad] on another vehicle, whose scenarios it shall fly.
+    """
     zeros, ranges = np.zeros(len(parts.joints)), _ranges(parts, answers)
     geometry.set_angles(parts, zeros)
     feet, low = _feet(parts)
     clearance = answers.assumed.number("clearance")
-    angles, bottom = _stow(parts, ranges, low, clearance)
+    if usual is None:
+        angles, bottom = _stow(parts, ranges, low, clearance)
+    else:
+        angles = np.array(usual)
+        geometry.set_angles(parts, angles)
+        bottom = _bottom(parts, _boxes(parts))
     legs = Told(False, FILE, "lowest shapes of the base")
     gap = bottom - low
     if feet is None or gap < clearance:
