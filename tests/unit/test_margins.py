@@ -3,6 +3,7 @@
 import math
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -329,3 +330,17 @@ def test_a_loop_that_acts_on_nothing_has_no_crossing_and_no_warning():
 def test_a_posture_beyond_the_joints_ranges_is_refused(tmp_path, capsys):
     assert main(["margins", "--initial", "--arm", "0", "90", "--out", str(tmp_path)]) == 2
     assert "--arm: alpha_2 90 is outside" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("info", "complaint"),
+    [
+        ({"vehicle": "hexa_arm", "controller": "modular"}, "hexa_arm: give its --vehicle"),
+        ({"vehicle": "/pi/s500_arm.yaml", "controller": "asmc1"}, "asmc1: give its --profile"),
+    ],
+)
+def test_the_flight_of_another_law_or_vehicle_is_refused(monkeypatch, capsys, info, complaint):
+    flown = SimpleNamespace(info=info)
+    monkeypatch.setattr("uam_lab.records.rebuild.series_of", lambda _: flown)
+    assert main(["margins", "--flight", "."]) == 2
+    assert complaint in capsys.readouterr().err

@@ -85,7 +85,9 @@ class Section:
     def mapping(self, key: str) -> dict[str, Any]:
         """Return the entry `key`, a mapping whose keys its reader checks."""
         value = self.entry(key)
-        if not isinstance(value, dict) or not value:
+        if value == {}:
+            raise self.error(key, "has no entry: give one, or leave it out")
+        if not isinstance(value, dict):
             raise self.error(key, f"a mapping expected, got {value!r}")
         return value
 

@@ -17,8 +17,13 @@ bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong u
 
 import argparse
 import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
+from uam_control.laws import catalogue
 from uam_control.mission import load_scenario
+from uam_control.profiles.profile import Profile
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import Command, given_profile, number, path
 from uam_lab.flights.conclude import command_line
@@ -68,7 +73,10 @@ def run(options: argparse.Namespace) -> int:
         known = " or ".join(MODELLED)
         raise SettingsError(f"{profile.name}: margins need setpoint: {known}")
     payloads = options.payload or [0.0, 0.2]
-    series = series_of(options.flight) if options.flight and not options.initial else None
+    series = None
+    if options.flight and not options.initial:
+        series = series_of(options.flight)
+        _check_flown(options.flight, series.info, profile)
     out = make_folder(options.out, "margins")  # before the flight, which takes long
     flown = None
     if not options.initial:
@@ -100,3 +108,13 @@ def run(options: argparse.Namespace) -> int:
     say(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
     say(f"results  {out}")
     return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE
+
+
+def _check_flown(folder: Path, info: Mapping[str, Any], profile: Profile) -> None:
+    """Refuse a flight of another law or vehicle: its gains are not those of the profile."""
+    law = info.get("controller", "")
+    if law in catalogue.LAWS and law not in profile.laws().values():
+        raise SettingsError(f"--flight {folder}: flown by the law {law}: give its --profile")
+    vehicle = Path(info.get("vehicle") or profile.vehicle.source).stem
+    if vehicle != profile.vehicle.name:
+        raise SettingsError(f"--flight {folder}: flown by {vehicle}: give its --vehicle")
