@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.supervision import PreflightCheck
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import ConfirmStep, KillStep, MagnetStep, guided
 from uam_lab.preflight.checklist.host import HostReader, governors
-from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import (
     BAD,
     GOOD,

@@ -149,7 +149,7 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ),
         ({"mocap": "vrpn_mocap"}, "mocap: a mapping expected, got 'vrpn_mocap'"),
         ({"magnet": GRIPPER | {"magnet_output": 7}}, "magnet_output: 7 is outside 1 to 6"),
-        ({"arm": {}}, "arm: a mapping expected"),
+        ({"arm": {}}, "arm: has no entry"),
         (
             {"magnet__through": "wifi"},
             "magnet.through: 'wifi' is not one of gpio, autopilot, servo, none",
@@ -169,6 +169,9 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"nodes": {"mission": {"batery": 1.0}}}, "mission: batery: unknown"),
         ({"nodes": {"mavlink_bridge": {"gcs": ""}}}, "gcs follows from the other options"),
         ({"nodes": {"arm_driver": {"rate": -1.0}}}, "nodes.arm_driver: rate: -1.0 is outside"),
+        ({"nodes": {"checklist": {"batery": 0.5}}}, "checklist: batery: unknown, did you"),
+        ({"nodes": {"checklist": {"battery": 7.0}}}, "nodes.checklist: battery: 7.0 is outside"),
+        ({"nodes": {"checklist": {"room_low": [0.0, 0.0]}}}, "nodes.checklist: room_low: "),
         ({"nodes": [1]}, "nodes: node: {name: value} expected, got [1]"),
     ],
 )

@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from uam_control.settings.checklist_parameters import (
+    ChecklistOptions,
+    ChecklistParameters,
+    MotionLimits,
+)
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.guided import JOINT, guided
-from uam_lab.preflight.checklist.limits import ChecklistParameters, MotionLimits
 from uam_lab.preflight.checklist.observation import Box, Observation
-from uam_lab.preflight.checklist_node import ChecklistOptions
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/preflight.md").read_text()
 

@@ -5,7 +5,6 @@ mission starts with `require_checklist` only when all items have passed.
 """
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.nodes.described import described_vehicle
-from uam_control.settings.parameter_set import ParameterError, ParameterSet, switch, text, vector
+from uam_control.settings.checklist_parameters import ChecklistOptions, ChecklistParameters
 from uam_control.settings.preflight_check import GUIDED
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
@@ -23,7 +22,6 @@ from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.host import HostReader
-from uam_lab.preflight.checklist.limits import ChecklistParameters
 from uam_lab.preflight.checklist.observation import Box, Observation
 from uam_lab.preflight.checklist.step import Step, StepState
 from uam_lab.preflight.checklist_feed import Feed
@@ -47,32 +45,6 @@ CORE = (
     *(wiring.RECORDER, wiring.ESTIMATOR, wiring.MISSION),
     *(wiring.POSITION, wiring.ATTITUDE, wiring.ARM, wiring.BRIDGE),
 )
-
-
-@dataclass(frozen=True)
-class ChecklistOptions(ParameterSet):
-    """What the checklist is about; it cannot change while the node runs."""
-
-    nodes: str = text(
-        "", "nodes that must run", f"names with commas between; empty: {', '.join(CORE)}"
-    )
-    record: str = text("", "JSON file of the results", "a file; empty: none")
-    recordings: str = text(".", "folder of the recording, for its disk space", "a folder")
-    room_low: tuple = vector(
-        (), "corner of the room that the geofence must keep, world: smallest x, y, z", "m",
-        -1e4, 1e4, 3, optional=True,
-    )  # fmt: skip
-    room_high: tuple = vector(
-        (), "the opposite corner: largest x, y, z", "m", -1e4, 1e4, 3, optional=True
-    )
-    magnet: bool = switch(True, "the vehicle has a magnet")
-
-    def check_together(self) -> None:
-        """Refuse a room with one corner only, or with a side of no length."""
-        if bool(self.room_low) != bool(self.room_high):
-            raise ParameterError("room_low, room_high: give both corners or none")
-        if any(a >= b for a, b in zip(self.room_low, self.room_high, strict=True)):
-            raise ParameterError("room_low must be below room_high on each axis")
 
 
 class ChecklistNode:

@@ -13,6 +13,7 @@ from uam_control.mission import ScenarioError
 from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnetParameters
 from uam_control.profiles.profile import BRIDGE, NODES, ProfileError, load_profile, servo_mode
 from uam_control.settings import configuration
+from uam_control.settings.checklist_parameters import check_checklist
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters
@@ -308,6 +309,8 @@ def _nodes(top: Section) -> dict[str, dict[str, Any]]:
                     raise values.error(name, "follows from the section room")
         elif node == ARM_DRIVER:
             _tried(nodes, node, lambda v=values: ArmDriverParameters.from_mapping(v.values))
+        elif node == "checklist":
+            _tried(nodes, node, lambda v=values: check_checklist(v.values))
     return {node: dict(values) for node, values in given.items()}
 
 

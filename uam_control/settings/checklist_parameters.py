@@ -1,8 +1,16 @@
-"""Limits of the checklist, parameters of its node. Their reasons: docs/preflight.md."""
+"""Parameters of the checklist's node: limits (reasons: docs/preflight.md) and options."""
 
 from dataclasses import dataclass
+from typing import Any
 
-from uam_control.settings.parameter_set import ParameterSet, number, switch
+from uam_control.settings.parameter_set import (
+    ParameterError,
+    ParameterSet,
+    number,
+    switch,
+    text,
+    vector,
+)
 
 
 @dataclass(frozen=True)
@@ -94,3 +102,36 @@ class MotionLimits(ParameterSet):
 @dataclass(frozen=True)
 class ChecklistParameters(SensorLimits, DeviceLimits, MotionLimits):
     """All limits of the checklist."""
+
+
+@dataclass(frozen=True)
+class ChecklistOptions(ParameterSet):
+    """What the checklist is about; it cannot change while the node runs."""
+
+    nodes: str = text(
+        "", "nodes that must run", "names with commas between; empty: recorder and those of a tick"
+    )
+    record: str = text("", "JSON file of the results", "a file; empty: none")
+    recordings: str = text(".", "folder of the recording, for its disk space", "a folder")
+    room_low: tuple = vector(
+        (), "corner of the room that the geofence must keep, world: smallest x, y, z", "m",
+        -1e4, 1e4, 3, optional=True,
+    )  # fmt: skip
+    room_high: tuple = vector(
+        (), "the opposite corner: largest x, y, z", "m", -1e4, 1e4, 3, optional=True
+    )
+    magnet: bool = switch(True, "the vehicle has a magnet")
+
+    def check_together(self) -> None:
+        """Refuse a room with one corner only, or with a side of no length."""
+        if bool(self.room_low) != bool(self.room_high):
+            raise ParameterError("room_low, room_high: give both corners or none")
+        if any(a >= b for a, b in zip(self.room_low, self.room_high, strict=True)):
+            raise ParameterError("room_low must be below room_high on each axis")
+
+
+def check_checklist(values: dict[str, Any]) -> None:
+    """Raise ParameterError for what is no parameter of the checklist's node, or a wrong value."""
+    options = ChecklistOptions.specs()
+    ChecklistOptions.among(values)
+    ChecklistParameters.from_mapping({k: v for k, v in values.items() if k not in options})
