@@ -17,6 +17,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.status import ERROR
 from uam_msgs_py.node import sole_publisher
 from uam_msgs_py.node.door import Door
+from uam_msgs_py.node.double import STARTED
 from uam_msgs_py.node.rightful import RightfulNodes
 from uam_msgs_py.node.wiring import READERS, Connections
 
@@ -305,3 +306,16 @@ def test_unusable_messages_of_the_rightful_node_are_named_and_the_next_good_one_
     probe.until(other_clock, "stamps of another clock are named")
     before = len(magnet)
     states.until(lambda n=before: len(magnet) > n, "states are used")
+
+
+def test_of_two_nodes_of_one_name_the_later_one_ends_and_both_say_so(start, probe):
+    said = probe.collect(topics.DIAGNOSTICS)
+    options = (MODULE, "--ros-args", "-p", "scenario:=hover")
+    start(*options).until_logged("waiting for")
+    later = start(*options)
+    probe.until(lambda: later.process.poll() is not None, "the later one to end")
+    assert later.process.wait(10.0) == 1
+    assert later.output.splitlines()[-1].endswith("a node /mission runs already: end it first")
+    reports = [status for message in said for status in message.status]
+    told = [one for one in reports if one.message == "another node is named /mission"]
+    assert len({pair.value for one in told for pair in one.values if pair.key == STARTED}) == 2

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -26,6 +27,7 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import log_callers, process_options, wiring
 from uam_msgs_py.node.door import LOG_PERIOD, Polled
+from uam_msgs_py.node.double import STARTED, Double
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.health import LoopTime, StampWatch, ages
 from uam_msgs_py.node.joins import StampJoin
@@ -52,6 +54,7 @@ class UamNode(TunableNode):
     """
 
     wake_up = 0.1  # s of wall time, longest wait for a trigger
+    failure = ""  # why the node ends by itself
 
     def __init__(self, name: str):
         super().__init__(name)
@@ -69,6 +72,7 @@ class UamNode(TunableNode):
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
         self.ticks = 0
         self._loop = LoopTime()
+        self._double = Double(self)
         self._at_last_report = (0, 0.0)
         self._dropped_before = 0
         self._waiting: list[str] = []  # required inputs without a message in the last LOG_PERIOD
@@ -202,6 +206,20 @@ class UamNode(TunableNode):
             faulthandler.dump_traceback_later(END_PATIENCE, exit=True)
         super().destroy_node()
 
+    def _doubled(self) -> str:
+        """Return what to report while another node has this name; listen whether it lives."""
+        if not self._double.seen():
+            return ""
+        reports = self.inlets.get(topics.DIAGNOSTICS.name)
+        if reports is not None:  # the loop does not wait for what it did not begin with
+            self.take_waiting(reports)
+        elif self._double.young:
+            self.listen(topics.DIAGNOSTICS, self._on_report, required=False)
+        return f"another node is named {self.get_fully_qualified_name()}"
+
+    def _on_report(self, message: DiagnosticArray) -> None:
+        self.failure = self.failure or self._double.note(message)
+
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return level, summary and further values for /diagnostics; overridden by subclasses."""
         return OK, "running", {}
@@ -211,11 +229,13 @@ class UamNode(TunableNode):
         ticks, last = self._at_last_report
         now = time.monotonic()
         done = self.ticks - ticks
-        dropped = self.dropped
+        dropped, doubled = self.dropped, self._doubled()
         self._at_last_report = (self.ticks, now)
         if new := self.door.news():
             level, summary = ERROR, "; ".join(new)
             self.get_logger().error(summary)
+        elif doubled and level < ERROR:
+            level, summary = WARN, doubled
         elif self._waiting and level < ERROR:
             names = (expanded(self.get_namespace(), name) for name in self._waiting)
             level, summary = STALE, "waiting for " + ", ".join(names)
@@ -224,6 +244,7 @@ class UamNode(TunableNode):
             level, summary = WARN, f"{newly} ticks dropped since last report"
         self._dropped_before = dropped
         common = {
+            STARTED: self._double.started,
             "ticks": self.ticks,
             "tick rate [Hz]": f"{done / (now - last):.1f}" if last else "",
             **self._loop.report(),
