@@ -100,6 +100,17 @@ def test_poses_are_refused_for_ten_seconds_and_then_followed_for_more_than_one()
     assert gate.refused == 43
 
 
+def test_wrong_poses_that_pass_through_the_true_place_do_not_count():
+    gate = after_a_while()
+    # exchanged axes: off for 0.2 s, near for 0.08 s, off again, and right from 0.48 s on
+    wrong = [0.5] * 25 + [0.1] * 10 + [0.7] * 25
+    assert all(refusals(gate, wrong))
+    right = refusals(gate, [0.0] * 100, begin=60 * PERIOD)
+    assert right == [True] * 63 + [False] * 37  # refused for 0.5 s = 62.5 poses
+    # a few wrong ones cost nothing
+    assert not any(refusals(gate, [0.5] * 10 + [0.0] * 10, begin=160 * PERIOD)[10:])
+
+
 def test_no_rejection_while_the_imu_contradicts_the_estimate():
     gate = after_a_while()
     assert not any(refusals(gate, [0.02] * 5, bias=1.1))

@@ -40,3 +40,11 @@ def test_a_pose_that_the_estimate_contradicts_is_not_sent(state, sent):
         pacing.take(0.02 * k, np.array([x, 0.0, 0.0]), LEVEL, True)
         pacing.send(port, 0.02 * k, state)
     assert port.found == sent
+
+
+def test_after_a_pose_that_is_off_only_a_close_one_is_sent_for_half_a_second():
+    pacing, port = VisionPacing(VisionParameters()), Port()
+    for now, x in ((0.0, 0.7), (0.4, 0.3), (0.8, 0.31), (0.82, 0.1), (1.32, 0.32)):
+        pacing.take(now, np.array([x, 0.0, 0.0]), LEVEL, True)
+        pacing.send(port, now, moving(0.0))
+    assert port.found == [0.1, 0.32]

@@ -9,6 +9,9 @@ The gate detects jumps only, as of another body taken for the vehicle. The estim
 poses that drift slowly; then the return to the true pose is the jump and must not be rejected. In
 that case motion capture and IMU contradict each other, and the estimated accelerometer bias is
 large: the gate then accepts all poses.
+
+Wrong poses may pass through the true place, as those of exchanged axes do. So where no pose has
+agreed for BRIEF, those that agree count only after AGREED.
 """
 
 import math
@@ -25,9 +28,10 @@ WHOLE, REAL = "behind", "newest age ahead_since"
 POSITION, POSE = 3, 7
 CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
 MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
+BRIEF, AGREED = 0.1, 0.5  # s, see above; single poses that are wrong come for less
 # distance [m]: from the estimate, above which a pose is rejected; stamps [s]; rejecting_since: NaN
-# while no pose is rejected
-GATE = "distance suspended last interrupted rejecting_since"
+# while no pose is rejected; off, near: of the last pose that was not near, and was; near_since
+GATE = "distance suspended last interrupted rejecting_since off near near_since"
 
 
 def no_pose() -> np.ndarray:
@@ -110,6 +114,7 @@ def forget_rejections(gate: np.ndarray) -> None:
     m = gate[0]
     m.refused = 0
     m.suspended = m.last = m.interrupted = -math.inf
+    m.off = m.near = m.near_since = -math.inf
     m.rejecting_since = math.nan
 
 
@@ -127,7 +132,8 @@ def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float, longes
         m.suspended = stamp
     m.last = stamp
     trusted = stamp - m.suspended > MEMORY
-    if not (distance > m.distance and trusted):
+    agrees = agreed_for(gate, stamp, trusted and distance > m.distance) > AGREED
+    if agrees or not trusted:
         m.rejecting_since = math.nan
         return False
     if math.isnan(m.rejecting_since):
@@ -138,6 +144,19 @@ def rejects(gate: np.ndarray, stamp: float, distance: float, bias: float, longes
         return False
     m.refused += 1
     return True
+
+
+@borrowing
+def agreed_for(gate: np.ndarray, stamp: float, off: bool) -> float:
+    """Return for how long [s] poses have agreed at `stamp` [s], 0 for one that is off."""
+    m = gate[0]
+    if off:
+        m.off = stamp
+        return 0.0
+    if m.off > m.near and stamp - m.near > BRIEF:
+        m.near_since = stamp
+    m.near = stamp
+    return stamp - m.near_since
 
 
 @borrowing

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.ages import FORWARDED
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT
-from uam_control.estimation.pose_clock import counts, new_clock, no_pose, repeated
+from uam_control.estimation.pose_clock import AGREED, counts, new_clock, no_pose, repeated
 from uam_control.maths.compiled import borrowing, prepared
 from uam_control.maths.kept_tuple import bound
 from uam_control.maths.memory import put, record
@@ -19,6 +19,7 @@ from uam_control.stages.autopilot_port import AutopilotPort
 # [m] by which a pose may be off the estimate: more than an estimate drifts without poses before the
 # failsafe; PX4's EKF2 rejects a pose at 5 standard deviations, about as much
 BEYOND = 0.5
+CLOSE = 0.15  # [m] the same within AGREED after such a pose: exchanged axes may come near
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,9 @@ class VisionArrays(NamedTuple):
     pose: np.ndarray  # (7,) newest position and quaternion
     last: np.ndarray  # (7,) see `repeated`
     clock: np.ndarray  # (1,) see `counts`
-    numbers: np.ndarray  # (1,) whether the pose waits; [s]: its exposure, the last sent, interval
+    # (1,) whether the pose waits; [s]: its exposure, the last sent, interval, the last off the
+    # estimate
+    numbers: np.ndarray
 
 
 class VisionPacing:
@@ -50,8 +53,8 @@ class VisionPacing:
     """
 
     def __init__(self, parameters: VisionParameters) -> None:
-        p, numbers = parameters, record("waits", "exposed sent interval")
-        numbers[0] = False, 0.0, -1.0, p.vision_interval
+        p, numbers = parameters, record("waits", "exposed sent interval off")
+        numbers[0] = False, 0.0, -1.0, p.vision_interval, -math.inf
         self.arrays = VisionArrays(np.zeros(7), no_pose(), new_clock(), numbers)
         self._deviations = p.vision_position_deviation, p.vision_attitude_deviation
         self._unknown = np.full((3, ALPHA), math.nan)
@@ -100,7 +103,9 @@ def pose_due(a: VisionArrays, now: float, state: np.ndarray, known: bool) -> boo
     if not m.exposed - m.sent >= m.interval - 1e-9:
         return False
     m.waits = False
-    if known and beyond(a.pose[:3], state, now - m.exposed) > BEYOND:
+    limit = BEYOND if m.exposed - m.off > AGREED else CLOSE
+    if known and beyond(a.pose[:3], state, now - m.exposed) > limit:
+        m.off = m.exposed
         return False
     m.sent = m.exposed
     return True
