@@ -12,6 +12,7 @@ from longer import longer
 from uam_control.grasp import Grasp
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_lab.experiments.trials.trial import feasible
 from uam_lab.flights.direct.flight import DirectFlight
 from uam_lab.records.results.metrics import compute
 from uam_lab.records.results.outcome import grasp_decisions
@@ -117,11 +118,12 @@ def test_a_payload_is_picked_from_a_table_by_the_scenario_alone(tmp_path):
 
 
 def test_the_trajectory_of_the_page_picks_and_drops(tmp_path):
-    """The CSV file of docs/scenarios.md, with a payload of its usual mass."""
+    """The CSV file of docs/scenarios.md, with a payload of its usual mass; `uam fly` takes it."""
     page = (Path(__file__).resolve().parents[2] / "docs/scenarios.md").read_text()
     (rows,) = re.findall(r"^```\n(t,px.*?magnet\n.*?)^```", page, re.M | re.S)
     file = tmp_path / "pick.csv"
     file.write_text(rows)
+    feasible(str(file), load_profile("s500"))
     a_flight = flight(str(file))
     a_flight.run()
     assert grasps(a_flight) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
