@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.vehicle.rotor_geometry import normalised_mixer, torque_scale
+from uam_control.vehicle.rotor_geometry import normalised_mixer, thrust_coefficient, torque_scale
 from uam_sim_bridge.autopilot.cycle import allocate, unallocated_torque
 
 PX = np.array([0.171, -0.171, 0.171, -0.171])
@@ -22,6 +22,12 @@ def run(roll, pitch, yaw, thrust):
     motors = np.zeros(4)
     allocate(np.array([roll, pitch, yaw]), thrust, MIXER, motors)
     return motors
+
+
+@pytest.mark.parametrize(("moment_ratio", "coefficient"), [(0.016, 6.5), (0.005, 20.0)])
+def test_px4_controls_the_yaw_of_rotors_with_little_torque(moment_ratio, coefficient):
+    """6.5 * 0.016 m = 0.104 is enough, 6.5 * 0.005 m = 0.033 is not above 0.05."""
+    assert thrust_coefficient(moment_ratio) == pytest.approx(coefficient)
 
 
 def test_mixer_of_the_square_quad():

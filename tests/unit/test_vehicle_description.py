@@ -49,6 +49,7 @@ def test_the_autopilot_of_the_s500():
         [0.171, 0.171, 0.016], [-0.171, -0.171, 0.016],
         [0.171, -0.171, -0.016], [-0.171, 0.171, -0.016],
     ]  # fmt: skip
+    assert [values[f"CA_ROTOR{i}_CT"] for i in range(4)] == [6.5] * 4  # PX4's default
     # 2.2 kg * 9.81 m/s^2 / (4 * 8.549e-6 * 1100^2 N) = 0.5216
     assert values["MPC_THR_HOVER"] == 0.52
     autopilot = Parameters.of(S500)

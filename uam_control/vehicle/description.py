@@ -12,6 +12,7 @@ import numpy as np
 from uam_control.coordinates import coordinates
 from uam_control.settings import configuration
 from uam_control.vehicle.gripper import MAGNET, Gripper, gripper_of
+from uam_control.vehicle.rotor_geometry import thrust_coefficient
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
 GRAVITY = 9.81  # [m/s^2] of parameter sets that no vehicle's description fills
@@ -185,5 +186,6 @@ class VehicleDescription:
                 f"CA_ROTOR{i}_PX": float(px),
                 f"CA_ROTOR{i}_PY": float(py),
                 f"CA_ROTOR{i}_KM": float(km),
+                f"CA_ROTOR{i}_CT": thrust_coefficient(self.rotor.moment_ratio),
             }
         return values

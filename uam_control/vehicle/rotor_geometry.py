@@ -11,6 +11,17 @@ import math
 import numpy as np
 
 ROLL, PITCH, YAW, THRUST = range(4)
+USUAL_COEFFICIENT = 6.5  # PX4's default of CA_ROTORn_CT
+AUTHORITY = 0.1  # twice the coefficient times lever up to which PX4 leaves an axis out
+
+
+def thrust_coefficient(moment_ratio: float) -> float:
+    """Return CA_ROTORn_CT of rotors with this reaction torque per newton [m].
+
+    PX4 does not control an axis on which no rotor has more than 0.05 (ControlAllocator.cpp), and
+    scales the coefficient out otherwise: it is its default, or what gives yaw AUTHORITY.
+    """
+    return max(USUAL_COEFFICIENT, AUTHORITY / moment_ratio)
 
 
 def effectiveness(px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray) -> np.ndarray:

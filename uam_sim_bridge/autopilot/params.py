@@ -10,6 +10,7 @@ from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.settings.texts import unknown
 from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle.rotor_geometry import USUAL_COEFFICIENT
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ ROTOR = {  # what of a rotor → default, limit, unit, meaning
     "PX": (0.0, 5.0, "m", "forward"),
     "PY": (0.0, 5.0, "m", "right"),
     "KM": (0.05, 1.0, "m", "moment per thrust, > 0 counter-clockwise"),
+    "CT": (USUAL_COEFFICIENT, 100.0, "N", "thrust at full speed, without effect here"),
 }
 ANY = 1e9  # limit of a parameter that is only stored
 
