@@ -76,6 +76,16 @@ def test_a_rate_loop_keeps_its_damping_and_its_torque(inertia, lag, torque):
     assert found.stiffness * 0.5 * found.bandwidth * 0.15 <= 0.45 * torque * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("period", [0.004, 0.008])
+def test_a_tick_makes_what_is_computed_at_once_half_of_it_late(period):
+    """sqrt(2) / (2 pi 40 Hz) of the gyroscope's filter and half a tick; a state is one tick older,
+    a joint's sample and torque are two. 1.5 in place of 0.5 made an S-500 of 8 ms err by 263 mm."""
+    of = Facts.of(Vehicle.of(replace(load_description(), control_period=period)))
+    assert of.dead == pytest.approx(0.005627 + 0.5 * period, abs=1e-6)
+    assert of.seen == pytest.approx(1.5 * period)
+    assert of.bus == pytest.approx(2.5 * period)
+
+
 def test_noise_limits_the_gains():
     """Variance 1 for D = 1: a command of 1 % allows D = 0.01."""
     noise = np.zeros((3, 2, 2))
@@ -297,6 +307,24 @@ def test_the_rate_loop_is_mended_before_the_loops_around_it():
     assert len(found.cases) == 1
     roll = found.cases[0].analysis.loops["roll"][1]
     assert search.shortfall(roll, criteria.margins, joint=False) is not None
+
+
+def test_a_rate_loop_that_is_unstable_is_mended_before_the_loops_around_it(tmp_path):
+    """At 8 ms roll, pitch, x, y and the arm lack margins at first; slower, they still would."""
+    (made,) = (one for one in vehicles.VEHICLES if one.name == "x8_2500")
+    described = replace(load_description(vehicles.write(made, tmp_path)), control_period=0.008)
+    found = search.Search(described, load_criteria()).evaluated()
+    assert not found.cases[0].analysis.stable
+    assert {*found.faults} == {search.RATES}
+
+
+def test_an_attitude_that_half_the_motors_do_not_hold_becomes_slower():
+    """Slower rates would need a slower attitude, too, without end."""
+    criteria = load_criteria()
+    criteria.attitude = 1.5
+    found = search.Search(load_description(), criteria).evaluated()
+    assert {*found.faults} == {"roll"}
+    assert "motors down" in found.summary
 
 
 def test_a_real_vehicle_without_its_margins_does_not_start(tmp_path, capsys, monkeypatch):

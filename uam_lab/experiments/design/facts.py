@@ -24,7 +24,7 @@ from uam_sim_bridge.autopilot.loops.rate_control import (
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.plant import Vehicle
 
-UNANSWERED = 1.5  # periods: a sample is half a period old on the average, and acts for one
+HELD = 0.5  # periods: a command acts for one period, on the average half of one late
 IMPULSE = 400  # samples of the filters' response to one sample of noise
 FILTERS = ("IMU_GYRO_CUTOFF", "IMU_DGYRO_CUTOFF", "MC_YAW_TQ_CUTOFF")
 
@@ -64,11 +64,11 @@ class Facts:
             torque=largest_torque(described),
             scale=torque_scale(*described.geometry(), described.rotor_thrust),
             lag=described.rotor.lag + np.array([0.0, 0.0, yaw]),
-            dead=math.sqrt(2.0) * gyro + UNANSWERED * period,
+            dead=math.sqrt(2.0) * gyro + HELD * period,
             slope=slope,
             noise=imu["gyro_noise"] ** 2 * noise_gains(1.0 / period, cutoffs),
-            seen=(imu["latency_ticks"] + UNANSWERED) * period,
-            bus=(bus + servos["command_latency_ticks"] + UNANSWERED) * period,
+            seen=(imu["latency_ticks"] + HELD) * period,
+            bus=(bus + servos["command_latency_ticks"] + HELD) * period,
             servo=np.array([one.effort_limit for one in described.servos]),
         )
 

@@ -238,10 +238,16 @@ class Search:
             found.setdefault(worst, Fault(f"delay margin {1e3 * analysis.setpoint_delay:.0f} ms"))
         # what is wrong with the rate loop shows in all loops around it: it is mended first
         factor = 10.0 ** (wanted.gain / 20.0)
-        if analysis.stable and (not found or {*stack.coordinates[ROLL:YAW]} & {*found}):
-            for name, one in (("up", factor), ("down", 1.0 / factor)):
-                if fastest_mode(scaled_motors(stack, one)).growth >= GROWTH:
-                    return {RATES: Fault(f"gain margin of all motors {name}")}
+        if not found or {*stack.coordinates[ROLL:YAW]} & {*found}:
+            up, down = (
+                fastest_mode(scaled_motors(stack, one)).growth < GROWTH
+                for one in (factor, 1.0 / factor)
+            )
+            # where less of the motors does not help an unstable vehicle, the fault is elsewhere
+            if not up and (analysis.stable or down):
+                return {RATES: Fault("gain margin of all motors up")}
+            if analysis.stable and not down:
+                return {stack.coordinates[ROLL]: Fault("gain margin of all motors down")}
         if not analysis.stable and not found:
             found = dict.fromkeys(self._shares, Fault("unstable"))
         return found
