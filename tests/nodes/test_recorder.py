@@ -213,7 +213,7 @@ def test_without_a_name_each_log_is_a_bag_of_its_own(start, tmp_path, monkeypatc
     logs = sorted(tmp_path.rglob("*.mcap"))
     assert len(logs) == 2
     for log in logs:
-        assert log.stem == log.parent.name
+        assert log.name == "log.mcap"
         with AnyReader([log.parent]) as reader:
             assert {c.topic for c in reader.connections} == {
                 absolute(topic) for topic in topics.RECORDED

@@ -147,7 +147,7 @@ def test_a_change_acts_from_the_next_tick_and_refused_ones_are_published(flying,
     assert [one.accepted for one in changes] == [True] + 6 * [False]
     assert changes[1].values["varpi"] == (0.2, 0.3)
     assert changes[3].values == {"no_such": (None, 1.0)} and changes[3].reason == "no_such: unknown"
-    assert changes[4].reason == "varpi: '1' is not numeric; allowed: 1e-09 to 1e+06 1"
+    assert changes[4].reason == "varpi: '1' is not numeric; allowed: 1e-09 to 1e+06"
     assert changes[6].reason == "law: read-only, fixed once the node runs"
 
 

@@ -253,4 +253,4 @@ def test_neither_log_nor_metadata_is_overwritten(tmp_path):
 
 
 def test_the_default_name_is_a_new_bag():
-    assert new_log_file("20260102-030405") == Path("log-20260102-030405/log-20260102-030405.mcap")
+    assert new_log_file("20260102-030405") == Path("log-20260102-030405/log.mcap")

@@ -152,8 +152,8 @@ class Mission(FlightSequence):
         if p.gripper == NO_GRIPPER:
             return False, "refused: the vehicle has no gripper"
         if (close := closes(opening, p.gripper_opening)) is None:
-            closed, opened = p.gripper_opening
-            return False, f"refused: opening {opening:g} is outside {closed:g} to {opened:g}"
+            low, high = sorted(p.gripper_opening)
+            return False, f"refused: opening {opening:g} is outside {low:g} to {high:g}"
         accepted, reason = self.switch_magnet(close)
         done = f"{'closes' if close else 'opens'} until the scenario grips or opens next"
         return accepted, done if accepted else reason

@@ -45,7 +45,7 @@ class Bound:
         """Return the range as text."""
         if self.whole:
             return f"{self.low:d} to {self.high:d}"
-        return f"{self.low:g} to {self.high:g} {self.unit}"
+        return f"{self.low:g} to {self.high:g} {self.unit}".removesuffix(" 1")
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,8 @@ class Check(NamedTuple):
         """The unit of the limits, "" for a ratio."""
         named = [limit for limit in (self.hold, self.land) if isinstance(limit, str)]
         specs = SupervisionParameters.specs()
-        return (specs[named[0]].unit if named[0] in specs else "s") if named else ""
+        found = (specs[named[0]].unit if named[0] in specs else "s") if named else ""
+        return found.removeprefix("1")
 
 
 # in the order of the values of `measure` and `read`

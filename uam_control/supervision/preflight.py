@@ -32,11 +32,11 @@ def preflight(
 
 def _limits(checks: Checks) -> Iterator[PreflightCheck]:
     for check, value, limit in checks.on_ground():
-        known = value != -math.inf
+        known, bound = value != -math.inf, "at most" if check.sign > 0 else "at least"
         yield PreflightCheck(
             check.name,
             f"{check.sign * value:.3g} {check.unit}".strip() if known else UNKNOWN,
-            f"{'at most' if check.sign > 0 else 'at least'} {check.sign * limit:.3g} {check.unit}",
+            f"{bound} {check.sign * limit:.3g} {check.unit}".strip(),
             value < limit if known else check.name not in REQUIRED,
         )
 
@@ -50,7 +50,8 @@ def _at_rest(
     held = seen.authority.released_to
     yield PreflightCheck("control", held or "free", "free", not held)
     failed = seen.authority.failed
-    yield PreflightCheck("bridge", failed or "ready", "ready", not failed)
+    ready = "ready; after a kill the bridge must be started again"
+    yield PreflightCheck("bridge", failed or "ready", ready, not failed)
     speed = float(np.linalg.norm(seen.state[CHI_DOT, POSITION]))
     limit = f"at most {start_speed:.3g} m/s"
     yield PreflightCheck("speed", f"{speed:.3g} m/s", limit, speed <= start_speed)

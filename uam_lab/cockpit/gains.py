@@ -61,7 +61,7 @@ def bounds(about: ParameterDescriptor) -> tuple[float, float]:
     """Return the range declared by the node; for a vector that of each entry."""
     for span in about.floating_point_range:
         return span.from_value, span.to_value
-    words = about.additional_constraints.removeprefix("each ").split()
+    words = about.additional_constraints.removeprefix("each ").partition(";")[0].split()
     try:
         return float(words[0]), float(words[2])
     except (IndexError, ValueError):

@@ -48,7 +48,7 @@ class RecorderParameters(ParameterSet):
     """Files and periods of the recorder; they cannot change while the node runs."""
 
     file: str = text(
-        "", "the log to write", "a new file; empty: log-<time>/log-<time>.mcap in this folder"
+        "", "the log to write", "a new file; empty: log-<time>/log.mcap in this folder"
     )
     statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
     facts: str = text(

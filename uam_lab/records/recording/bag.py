@@ -176,6 +176,5 @@ def _time(duration: Duration) -> dict[str, int]:
 
 
 def new_log_file(stamp: str) -> Path:
-    """Return `log-<stamp>/log-<stamp>.mcap`: a bag of ROS 2 is a folder."""
-    name = f"log-{stamp}"
-    return Path(name) / f"{name}.mcap"
+    """Return `log-<stamp>/log.mcap`: a bag of ROS 2 is a folder, and `uam report` reads it."""
+    return Path(f"log-{stamp}") / "log.mcap"
