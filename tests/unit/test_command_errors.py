@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from uam_control import executables
-from uam_control.executables import interrupt
 from uam_control.settings.configuration import ConfigurationError
+from uam_lab import executables
 from uam_lab.cli.main import main
 from uam_lab.cli.parser import run
+from uam_lab.executables import interrupt
 
 ROOT = Path(__file__).resolve().parents[2]
-ENTRY = "uam_control.executables:main"
+ENTRY = "uam_lab.executables:main"
 
 
 def test_an_error_of_the_project_or_the_system_is_one_line(capsys):
@@ -95,7 +95,7 @@ def test_ctrl_c_that_a_compilation_would_lose_comes_behind_it():
 def test_ctrl_c_while_a_node_loads_ends_it_without_a_word():
     program = """
 import importlib, sys, time
-from uam_control.executables import main
+from uam_lab.executables import main
 
 def load(module):
     print(module, flush=True)

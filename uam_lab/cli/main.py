@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 
-from uam_control.executables import interrupt
+from uam_lab.executables import interrupt
 from uam_lab.flights.processes.interrupts import INTERRUPTED
 
 UTF_8 = "PYTHONUTF8"  # variable of Python

@@ -6,11 +6,11 @@ from typing import Any
 
 import yaml
 
-from uam_control import executables
 from uam_control.mission.time_limit import time_limit
 from uam_control.profiles.profile import servo_mode
 from uam_control.settings.atomic import write_text
 from uam_control.vehicle import VehicleDescription, load_description
+from uam_lab import executables
 from uam_lab.cockpit import page_address
 from uam_lab.flights.conclude import settings_facts
 from uam_lab.flights.flight_options import AUTOPILOT_IMU, BUILTIN

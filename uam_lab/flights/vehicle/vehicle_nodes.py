@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from uam_control.executables import MODULES
 from uam_control.offboard.autopilot_magnet import NONE
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import POSITION_SERVO
 from uam_lab.cockpit import page_address
+from uam_lab.executables import MODULES
 from uam_lab.flights.flight_options import ONLOOKERS
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.ros import node_arguments
