@@ -49,7 +49,7 @@ def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
         flight.hold()  # first: the hover of the scenario lasts seconds only
         held = flight.wait_for("holding", 30.0)
         assert held.cause == "hold by command"
-        old, new = flight.set_parameters("position_controller", lambda_1=[2.0, 2.0, 2.0])[
+        old, new = flight.set_parameters("position_controller", lambda_1=np.full(3, 2.0))[
             "position_controller"
         ]["lambda_1"]
         assert new == [2.0] * 3 != old

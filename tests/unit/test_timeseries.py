@@ -30,6 +30,11 @@ def test_blocks_lay_out_a_state_row_by_row():
     assert series.block("adaptation.arm.").shape == (1, 36)  # the gains of all laws
 
 
+def test_a_column_that_is_not_there_has_near_ones():
+    with pytest.raises(KeyError, match=r"truth.q: unknown, did you mean truth.[xyz]\?"):
+        COLUMNS["truth.q"]
+
+
 def test_a_prefix_without_adjacent_columns_is_refused():
     with pytest.raises(KeyError, match="nothing"):
         COLUMNS.block("nothing.")

@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.supervision.preflight import UNKNOWN
@@ -301,7 +303,8 @@ class Flight:
         All are applied between two ticks, or none. Returns node → name → (old, new). Raises
         CommandRefused with the reason.
         """
-        desired = {node: values} if isinstance(node, str) else node
+        asked = {node: values} if isinstance(node, str) else node
+        desired = {one: _of_python(given) for one, given in asked.items()}
         return self._commands().change(lambda switch: switch.change(desired))
 
     def set_profile(self, *names_or_files: str | Path) -> Changes:
@@ -394,3 +397,10 @@ def _engine(name: str) -> Engine:
     else:
         from uam_lab.flights.ros.engine import fly as engine
     return engine
+
+
+def _of_python(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values with lists and numbers in place of those of numpy."""
+    return {
+        k: v.tolist() if isinstance(v, np.ndarray | np.generic) else v for k, v in values.items()
+    }

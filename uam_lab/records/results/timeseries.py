@@ -27,6 +27,7 @@ from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.motion.flatness import Flyer, flattened
 from uam_control.settings.atomic import replacing
+from uam_control.settings.texts import unknown
 from uam_control.vehicle import TWO_FINGER, VehicleDescription
 
 GROUPS = TRUTH, REFERENCE, ERROR = "end_effector", "end_effector_reference", "end_effector_error"
@@ -118,6 +119,8 @@ class Columns:
         return len(self.names)
 
     def __getitem__(self, name: str) -> int:
+        if name not in self._number:
+            raise KeyError(f"{name}: {unknown(name, self.names)}")
         return self._number[name]
 
     def __contains__(self, name: str) -> bool:
