@@ -219,6 +219,18 @@ def test_beside_the_stand_the_arm_gives_way_to_the_autopilots_landing(text):
 
 
 @pytest.mark.parametrize(
+    ("path", "text", "seed"),
+    [
+        ("lemniscate_payload", "mavlink_cut@carry+3.181", 9401),
+        longer("race_5_payload", "mocap_freeze@drop+3.669", 46),
+    ],
+)
+def test_a_payload_that_hangs_down_does_not_touch_the_ground_first(path, text, seed):
+    _, series, figures = flown(text, seed=seed, scenario=load_scenario(path))
+    assert classify(series, figures) in ("landed", "failsafe")
+
+
+@pytest.mark.parametrize(
     "text", ["mocap_dropout@take-off", "imu_dropout@take-off+0.4", "mavlink_cut@take-off+0.4"]
 )
 @pytest.mark.parametrize("seed", [1, longer(2), longer(6)])

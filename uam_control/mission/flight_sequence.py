@@ -60,6 +60,8 @@ from uam_control.vehicle import VehicleDescription
 WHOLE, REAL = "takes_off", "stamp takeoff ground height speed half"
 NOBODY = Authority()  # has taken control from the companion
 OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
+# in parts of stow_rate, in a failsafe: a payload that hangs down would touch the ground first
+HURRY = 2.0
 
 
 class FlightSequence:
@@ -350,7 +352,7 @@ class FlightSequence:
         output.magnet = self._magnet_on(decision)
 
     def _give_way(self, stamp: float, seen: Observation) -> None:
-        """Let the arm yield while the autopilot comes down by itself beside a payload's stand.
+        """Stop and stow the arm where the autopilot comes down by itself; beside a stand it yields.
 
         A stiff arm on the stand levers the vehicle over. A silent bridge sends no setpoints.
         """
@@ -360,16 +362,22 @@ class FlightSequence:
         lands = lands and not held.landed and guidance is not None
         flying = self.output.state is State.FLYING  # nobody has stopped it
         if not lands:
-            if self._beside and flying:
+            if self._beside is not None and flying:
                 guidance.go_on(stamp)
             self._beside = None
             return
         if self._beside is None:
             self._beside = bool(np.any(guidance.clear(guidance.motion[CHI])))
-            if self._beside and flying:
-                guidance.stop(stamp, stow=False)
+            if flying or self.output.state is State.HOLDING:
+                self._stop_to_land(stamp, self._parameters.arm_failsafe == "stow")
         if self._beside:
             guidance.give_way(stamp, seen.state[CHI, ARM])
+
+    def _stop_to_land(self, stamp: float, stow: bool) -> None:
+        """Stop, as the autopilot comes down by itself; stow: the arm, before the ground."""
+        self._guidance.stop(stamp, stow=False)
+        if stow:
+            self._guidance.move_arm(stamp, hurry=HURRY)
 
     def _descend(self, stamp: float) -> None:
         """Descend in an unplanned landing, vertically from the vehicle's position: not on a stand.
@@ -429,7 +437,7 @@ class FlightSequence:
             if guidance.fast:
                 guidance.stop(stamp, decision.stow, self._parameters.brake_acceleration)
         elif state is State.FAILSAFE:
-            guidance.stop(stamp, decision.stow)
+            self._stop_to_land(stamp, decision.stow)
             self._fell_since = stamp
         elif event is Event.STOPPED:
             self._fell_since = stamp

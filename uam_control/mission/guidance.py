@@ -272,9 +272,9 @@ class Guidance:
         if stow:
             self.move_arm(stamp)
 
-    def move_arm(self, stamp: float, angles: np.ndarray | None = None) -> None:
-        """Move the arm to `angles` [rad] from `stamp` [s] on; None: stow it."""
-        self._arm = self._arm_segment(stamp, self._stowed if angles is None else angles)
+    def move_arm(self, stamp: float, angles: np.ndarray | None = None, hurry: float = 1.0) -> None:
+        """Move the arm to `angles` [rad] from `stamp` [s] on, see `arm_length`; None: stow it."""
+        self._arm = self._arm_segment(stamp, self._stowed if angles is None else angles, hurry)
         self._plans.pop(False, None)
 
     def give_way(self, stamp: float, angles: np.ndarray) -> None:
@@ -403,10 +403,10 @@ class Guidance:
         acceleration = p.stop_acceleration if self._brake is None else p.brake_acceleration
         return at_rest(self.motion, acceleration, p, self._stowed if stow else None)
 
-    def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
+    def _arm_segment(self, stamp: float, angles: np.ndarray, hurry: float = 1.0) -> Segment:
         goal = self.motion[CHI].copy()
         goal[ARM] = angles
-        length = arm_length(self.motion, angles, self.parameters)
+        length = arm_length(self.motion, angles, self.parameters, hurry)
         return Segment(stamp, self.motion, goal, np.full_like(goal, length))
 
     def _ramp_length(self, shortest: float = math.inf, acceleration: float | None = None) -> float:

@@ -107,14 +107,17 @@ def at_rest(
     return end, lengths
 
 
-def arm_length(motion: np.ndarray, angles: np.ndarray, p: MissionParameters) -> float:
-    """Return the time [s] for the arm to reach `angles` [rad] within stow_rate.
+def arm_length(
+    motion: np.ndarray, angles: np.ndarray, p: MissionParameters, hurry: float = 1.0
+) -> float:
+    """Return the time [s] for the arm to reach `angles` [rad] within `hurry` times stow_rate.
 
     A joint that moves away from them first stops. Its way back is longer by rate * time / 2,
     and at the peak of the way back, midway, half of the rate away is left.
     """
     way = angles - motion[CHI, ARM]
-    away = np.clip(-np.sign(way) * motion[CHI_DOT, ARM], 0.0, p.stow_rate)
+    rate = hurry * p.stow_rate
+    away = np.clip(-np.sign(way) * motion[CHI_DOT, ARM], 0.0, rate)
     back = np.abs(way) + away * p.stop_time / 2
-    peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
+    peak = rate - (PEAK - 1.0) / 2.0 * away
     return max(p.stop_time, PEAK * float(np.max(back / peak)))
