@@ -1,13 +1,16 @@
 """The measured delay of the attitude loop: a known delay, a quiet vehicle, gaps, wrong models."""
 
 import math
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from uam_control.setpoints.loop_delay import DELAYS, LoopDelay, follow, pause
+from uam_control.setpoints.loop_delay import LoopDelay, follow, pause
 from uam_control.supervision import SupervisionParameters
 from uam_control.supervision.checks import by_link, by_loop, larger, margin_left
+from uam_control.vehicle import derived_parameters, load_description
 
 PERIOD, LAG = 0.004, 0.017
 
@@ -103,9 +106,14 @@ def test_a_pause_and_a_gap_lose_the_value_and_not_the_next_one():
 
 
 def test_a_delay_beyond_the_longest_is_the_longest():
-    assert measured(Loop(DELAYS + 3), 4.0).value >= 0.8 * (DELAYS - 1) * PERIOD or math.isnan(
-        measured(Loop(DELAYS + 3), 4.0).value
-    )
+    value = measured(Loop(34), 4.0).value  # 30 periods are 120 ms
+    assert value >= 0.8 * 0.12 or math.isnan(value)
+
+
+def test_a_delay_of_many_short_ticks(monkeypatch):
+    """45 ticks of 2 ms; 30 ticks are 60 ms, less than what the loops stand."""
+    monkeypatch.setattr(sys.modules[__name__], "PERIOD", 0.002)
+    assert measured(Loop(44), 4.0).value == pytest.approx(0.090, abs=0.003)
 
 
 def test_a_body_that_turns_the_other_way_gives_no_value():
@@ -210,3 +218,12 @@ def test_the_larger_delay_counts_and_an_unknown_one_does_not():
     assert larger(0.01, 0.02) == larger(0.02, 0.01) == 0.02
     assert larger(0.01, math.nan) == larger(math.nan, 0.01) == 0.01
     assert math.isnan(larger(math.nan, math.nan))
+
+
+@pytest.mark.parametrize(("period", "nominal"), [(0.002, 0.0), (0.004, 0.007), (0.008, 0.0214)])
+def test_a_link_without_delay_has_the_loop_delay_of_its_tick(period, nominal):
+    """Measured in flights of the S-500: 0.0, 5.9 and 21.3 ms; the rest counts as the link's."""
+    vehicle = replace(load_description(), control_period=period)
+    found = derived_parameters(vehicle)
+    assert found["mission"]["delay_nominal"] == pytest.approx(nominal)
+    assert found["attitude_controller"]["prediction_nominal"] == pytest.approx(nominal)

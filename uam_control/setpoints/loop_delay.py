@@ -30,7 +30,7 @@ import numpy as np
 
 from uam_control.maths.compiled import borrowing, jit, prepared
 
-DELAYS = 31  # T of 0 to 30 periods, 120 ms at 250 Hz
+LONGEST = 0.12  # [s] largest T
 LOW, HIGH = 1.0, 10.0  # [Hz] corners of the band-pass; two low-passes: propellers shake the gyro
 MEMORY = 2.0  # [s] time constant of forgetting
 ENOUGH = 1.0  # [s] of flight before the first value
@@ -71,8 +71,8 @@ class DelaySums(NamedTuple):
 
     now: np.ndarray  # (3,) STAMP..SETTLING
     filters: np.ndarray  # (12, 2)
-    past: np.ndarray  # (2, DELAYS) setpoints
-    sums: np.ndarray  # (2, 2, DELAYS)
+    past: np.ndarray  # (2, delays) setpoints
+    sums: np.ndarray  # (2, 2, delays)
     total: np.ndarray  # (3,) sums of the squared accelerations, of the weights
 
 
@@ -88,11 +88,12 @@ class LoopDelay:
         self.numbers = DelayNumbers(
             float(period), math.exp(-period / MEMORY), *gains, *keep.tolist()
         )
+        delays = round(LONGEST / period) + 1
         self.sums = DelaySums(
             np.array([math.nan, 0.0, 0.0]),
             np.zeros((_ROWS, AXES)),
-            np.zeros((AXES, DELAYS)),
-            np.zeros((AXES, 2, DELAYS)),
+            np.zeros((AXES, delays)),
+            np.zeros((AXES, 2, delays)),
             np.zeros(AXES + 1),
         )
         self._both_axes = prepared(both_axes, self.sums.sums, self.sums.total, self.numbers)
@@ -142,9 +143,9 @@ def follow(
         for axis in range(AXES):
             filters[SETPOINT, axis] = setpoint[axis]
             filters[RATE, axis] = filters[LAST, axis] = rates[axis]
-        now[SETTLING] = DELAYS
+        now[SETTLING] = past.shape[1]
     now[STAMP] = stamp
-    now[NEWEST] = (now[NEWEST] + 1.0) % DELAYS
+    now[NEWEST] = (now[NEWEST] + 1.0) % past.shape[1]
     counts = now[SETTLING] <= 0.0
     now[SETTLING] -= 1.0
     advance(setpoint, rates, counts, state, numbers)
@@ -195,7 +196,7 @@ def advance(
 def both_axes(sums: np.ndarray, total: np.ndarray, numbers: DelayNumbers) -> tuple[float, float]:
     """Return the delay [s], NaN if unknown, and the explained share of the better axis.
 
-    sums (2, 2, DELAYS), total (3,): see LoopDelay.
+    sums (2, 2, delays), total (3,): see LoopDelay.
     """
     gains, period = (numbers.least, numbers.largest), numbers.period
     least = largest = math.nan
@@ -224,7 +225,7 @@ def both_axes(sums: np.ndarray, total: np.ndarray, numbers: DelayNumbers) -> tup
 def best(sums: np.ndarray, total: float, gains: tuple[float, float]) -> tuple[float, float]:
     """Return the delay [periods] of an axis' best fit, and the share of variance it explains.
 
-    NaN for a delay that is not certain: see the first lines. sums (2, DELAYS); total: the sum of
+    NaN for a delay that is not certain: see the first lines. sums (2, delays); total: the sum of
     the squared accelerations; gains [1/s]: least, largest.
     """
     count = sums.shape[1]

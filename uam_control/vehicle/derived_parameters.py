@@ -9,6 +9,9 @@ from uam_control.vehicle.description import AXES, VehicleDescription
 from uam_control.vehicle.gripper import MAGNET, TWO_FINGER, Gripper
 from uam_control.vehicle.loading import VehicleError
 
+# measured loop delay of a link without delay: share of the control period, and [s]; all vehicles of
+# config/vehicle and designs at 2 to 8 ms, 2026-11-29
+PERIODS, LESS = 3.6, 0.0074
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
 
 
@@ -24,6 +27,7 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
     arm = as_parameters(chain_of(vehicle))
     load = arm | {"arm_gravity": vehicle.gravity} | _load_friction(vehicle)
     drag = [round(drag / vehicle.mass, 6) for drag in vehicle.numbers["air"]["drag"]]
+    nominal = round(max(0.0, PERIODS * vehicle.control_period - LESS), 6)
     return {
         "state_estimator": {"gravity": vehicle.gravity},
         "position_controller": {
@@ -31,9 +35,14 @@ def derived_parameters(vehicle: VehicleDescription) -> dict[str, dict[str, Any]]
             "gravity_feedforward_mass": vehicle.mass,
             "drag_feedforward": drag,
         },
-        "attitude_controller": {"feedforward_washout": _integral_ratios(vehicle)} | load,
+        "attitude_controller": {
+            "feedforward_washout": _integral_ratios(vehicle),
+            "prediction_nominal": nominal,
+        }
+        | load,
         "arm_controller": load,
         "mission": {
+            "delay_nominal": nominal,
             "gravity": vehicle.gravity,
             "drag": drag,
             "joint_angle_hold": [
