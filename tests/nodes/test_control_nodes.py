@@ -110,6 +110,17 @@ def test_parameters_change_whole_or_not_at_all(start, probe):
     assert not set_parameter(probe, "attitude_controller", "control_period", 0.01).successful
 
 
+@pytest.mark.parametrize("name", ["mission", "position_controller"])
+def test_the_period_of_the_ticks_is_the_vehicles(start, probe, tmp_path, name):
+    """At 8 ms no flight over ROS took off: each second tick counted as missed."""
+    ours = configuration.path("vehicle/s500_arm.yaml")
+    text = ours.read_text().replace("control_period: 0.004", "control_period: 0.008")
+    file = tmp_path / "slow.yaml"
+    file.write_text(text.replace("model: ", f"model: {ours.parent}/"))
+    start(f"uam_control.nodes.{name}", "--ros-args", "-p", f"vehicle:={file}")
+    assert get_parameter(probe, name, "control_period").double_value == 0.008
+
+
 def test_every_parameter_has_meaning_unit_and_range(start, probe):
     start("uam_control.nodes.arm_controller")
     request = DescribeParameters.Request(names=["nu", "varpi", "lambda_form"])

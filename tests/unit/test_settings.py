@@ -2,6 +2,7 @@
 
 import pytest
 
+from uam_control.settings import configuration
 from uam_lab.flights.flight_settings import SettingsError, settings
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4.px4_installation import Px4Error
@@ -64,6 +65,16 @@ def test_torque_setpoints_for_px4_are_refused(px4_build):
     with pytest.raises(SettingsError, match="PX4 v1.16 and v1.17 take no torque over MAVLink"):
         settings(autopilot="px4", px4_dir=px4_build, **wrench)
     assert settings(**wrench).autopilot == "builtin"
+
+
+def test_px4_needs_ticks_that_it_answers(px4_build, tmp_path):
+    ours = configuration.path("vehicle/s500_arm.yaml")
+    text = ours.read_text().replace("control_period: 0.004", "control_period: 0.002")
+    file = tmp_path / "quick.yaml"
+    file.write_text(text.replace("model: ", f"model: {ours.parent}/"))
+    assert settings(vehicle=file).vehicle.control_period == 0.002
+    with pytest.raises(SettingsError, match="every 4 ms: control_period of quick is 2 ms"):
+        settings(vehicle=file, autopilot="px4", px4_dir=px4_build)
 
 
 def test_another_address_of_the_simulator_needs_an_autopilot_of_the_user(px4_build):

@@ -11,11 +11,11 @@ from std_srvs.srv import SetBool, Trigger
 
 from uam_control.control.controllers import Controller
 from uam_control.laws import catalogue
-from uam_control.nodes.described import described_vehicle
+from uam_control.nodes.described import described_timing, described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stages.law_stages import LawStage
-from uam_control.stages.tick_stamps import Timing, carried, serves
+from uam_control.stages.tick_stamps import carried, serves
 from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -59,7 +59,7 @@ class ControllerNode(UamNode):
         defaults = default_profile(law, self.vehicle).section(name)
         derived = derived_parameters(self.vehicle).get(name)
         self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
-        timing = NodeParameters(self, Timing, read_only=True).current
+        timing = described_timing(self, self.vehicle)
         self.controller = controller(self.parameter_set.current)
         self.stage = LawStage(self.controller, timing)
         self.parameter_set.apply = self.controller.set_parameters

@@ -1,4 +1,4 @@
-"""The read-only parameters `vehicle` and `scenario` of a node, names or files, and its options."""
+"""The read-only parameters `vehicle` and `scenario` of a node, names or files, and what follows."""
 
 import numpy as np
 from rclpy.node import Node
@@ -8,6 +8,7 @@ from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_s
 from uam_control.mission.motion.flatness import Flyer
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
+from uam_control.stages.tick_stamps import Timing
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError, load_description
 from uam_msgs_py.messages.navigation import hand_message
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
@@ -35,6 +36,12 @@ def described_scenario(node: Node, vehicle: VehicleDescription) -> Scenario:
         return load_scenario(name, vehicle, options)
     except ScenarioError as error:
         raise ParameterError(f"scenario: {error}") from None
+
+
+def described_timing(node: Node, vehicle: VehicleDescription) -> Timing:
+    """Declare the parameters of the control ticks; their period is the vehicle's by default."""
+    own = {"control_period": vehicle.control_period}
+    return NodeParameters(node, Timing, (), own, read_only=True).current
 
 
 def described_hand(vehicle: VehicleDescription) -> Flyer | None:

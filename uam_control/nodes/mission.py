@@ -22,7 +22,12 @@ from uam_control.mission import (
     Scenario,
     StartParameters,
 )
-from uam_control.nodes.described import described_hand, described_scenario, described_vehicle
+from uam_control.nodes.described import (
+    described_hand,
+    described_scenario,
+    described_timing,
+    described_vehicle,
+)
 from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs, offer_commands
 from uam_control.nodes.planner_inputs import PlannerInputs
@@ -35,7 +40,6 @@ from uam_control.profiles.profile import (
 )
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
-from uam_control.stages.tick_stamps import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, State
 from uam_control.supervision.checks import margin_left
@@ -103,7 +107,7 @@ class MissionNode(UamNode):
         self.parameter_set = NodeParameters(
             self, MissionParameters, axes, profile.section(NAME), derived
         )
-        timing = NodeParameters(self, Timing, read_only=True).current
+        timing = described_timing(self, vehicle)
         scenario = self._scenario(vehicle)
         start = NodeParameters(self, StartParameters, read_only=True).current
         self._has_clock = start.autopilot_has_clock

@@ -47,6 +47,7 @@ DEVICES = ("serial/by-id/*", "ttyACM*", "ttyUSB*")  # of /dev, on which an autop
 LAYOUTS = {False: "separate nodes", True: "fused: control nodes in one process"}
 NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 AUTOPILOT = "autopilot"  # name of its process
+PX4_PERIOD = 0.004  # [s] between two answers of PX4 in software, which waits for more samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +129,11 @@ def settings(scenario: str | Path | None = None, **given: Any) -> FlightSettings
         raise SettingsError(
             "--autopilot px4: PX4 v1.16 and v1.17 take no torque over MAVLink: a profile with the "
             "setpoints rates, attitude or position, or --autopilot builtin"
+        )
+    if o.autopilot == PX4 and vehicle.control_period < PX4_PERIOD:
+        raise SettingsError(
+            f"--autopilot px4: PX4 in software answers every {1e3 * PX4_PERIOD:g} ms: "
+            f"control_period of {vehicle.name} is {1e3 * vehicle.control_period:g} ms"
         )
     mass = scenario.payload_mass if o.payload_mass is None else o.payload_mass
     feasible = Feasibility(vehicle, profile.sets["mission"], mass)
