@@ -24,8 +24,8 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-# Nodes mostly wait for each other, so five tests run at once on two cores. Groups: tests/conftest.py.
-AT_ONCE := -n 5 --dist loadgroup --no-loadscope-reorder
+# Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
+AT_ONCE := -n 4 --dist loadgroup --no-loadscope-reorder
 MARKS := not slow and not long
 test: setup      ## all but the long and the slow tests; options: make test ARGS="tests/unit -x"
 	@$(BIN)/python -m uam_lab.flights.direct.warm_up
