@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.supervision import PreflightCheck
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import ConfirmStep, KillStep, MagnetStep, guided

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.supervision import PreflightCheck
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.checklist import Checklist
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.motion_step import MotionStep

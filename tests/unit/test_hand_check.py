@@ -12,9 +12,9 @@ from uam_control.mission.mission_output import HAND_CHECK, WAITING
 from uam_control.mission.pre_arm import OLDEST
 from uam_control.profiles.profile import load_profile
 from uam_control.setpoints.rate_thrust_map import RateThrustMap, RateThrustParameters
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.supervision import Authority, OperatorCommand, Readings, State
 from uam_control.vehicle import load_description
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 
 DT = 0.004
 PROFILES = ("s500", "asmc1", "asmc2")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_control.settings.checklist_parameters import (
+from uam_lab.flights.vehicle.checklist_parameters import (
     ChecklistOptions,
     ChecklistParameters,
     MotionLimits,

@@ -11,8 +11,8 @@ from free_port import free_port
 from longer import longer
 
 from uam_control.maths.rotations import matrix_from_quaternion
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.vehicle import load_description
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.guided import guided
 from uam_lab.preflight.checklist.observation import GyroIntegral, Sample
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, StepState

@@ -62,7 +62,7 @@ class Check(NamedTuple):
         named = [limit for limit in (self.hold, self.land) if isinstance(limit, str)]
         specs = SupervisionParameters.specs()
         found = (specs[named[0]].unit if named[0] in specs else "s") if named else ""
-        return found.removeprefix("1")
+        return "" if found == "1" else found
 
 
 # in the order of the values of `measure` and `read`

@@ -9,9 +9,9 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.host import HostReader
 from uam_lab.preflight.checklist.observation import (
     BAD,

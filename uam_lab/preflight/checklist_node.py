@@ -13,11 +13,11 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.nodes.described import described_vehicle
-from uam_control.settings.checklist_parameters import ChecklistOptions, ChecklistParameters
 from uam_control.settings.preflight_check import GUIDED
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_lab.cockpit.services import Services
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistOptions, ChecklistParameters
 from uam_lab.preflight.checklist.automatic import automatic
 from uam_lab.preflight.checklist.checklist import Checklist, record
 from uam_lab.preflight.checklist.guided import guided

@@ -286,8 +286,8 @@ class StopSignal:
 def run(make: Callable[[], UamNode], name: str) -> int:
     """Create a node and spin it until SIGINT or SIGTERM; return the exit status.
 
-    0: stopped by a signal; 1: failure of the node (text in its `failure`, if it has one); 2: bad
-    parameters or arguments, with one line on stderr.
+    0: stopped by a signal; 1: failure of the node (text in its `failure`); 2: bad parameters or
+    arguments, with one line on stderr.
     """
     return run_together(
         lambda: [make()],
@@ -368,7 +368,7 @@ def _initialized(name: str) -> bool:
 
 
 def _failure_of(nodes: Sequence[UamNode]) -> str:
-    return next((text for node in nodes if (text := getattr(node, "failure", ""))), "")
+    return next((node.failure for node in nodes if node.failure), "")
 
 
 def refuse(name: str, error: Exception) -> int:

@@ -69,7 +69,6 @@ class ArmDriverNode(UamNode):
         mode, gain = (vehicle.numbers["servos"][name] for name in ("mode", "position_p_gain"))
         self.driver = ArmDriver(chain, parameters, mode, vehicle.control_period, gain)
         self._bus = LateDevice(self, self._started, (ArmError, BusLost))
-        self.failure = ""  # why the node ends
         self._velocity = None  # (n,) [rad/s] desired
         hand = [GRIPPER] if chain.gripper is not None else []
         self._writer = JointStateWriter([*self._names, *hand])

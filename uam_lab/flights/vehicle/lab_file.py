@@ -13,7 +13,6 @@ from uam_control.mission import ScenarioError
 from uam_control.offboard.autopilot_magnet import NONE, AutopilotMagnetParameters
 from uam_control.profiles.profile import BRIDGE, NODES, ProfileError, load_profile, servo_mode
 from uam_control.settings import configuration
-from uam_control.settings.checklist_parameters import check_checklist
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters
@@ -23,6 +22,7 @@ from uam_lab.cockpit.page_address import LOCAL, PORT
 from uam_lab.flights import flight_settings
 from uam_lab.flights.flight_settings import FlightSettings
 from uam_lab.flights.node_options import FLIGHT_CONTROLLER, SettingsError
+from uam_lab.flights.vehicle.checklist_parameters import check_checklist
 from uam_sim_bridge.devices.dynamixel.chain import ArmChain, ArmError, chain_file, load_chain
 from uam_sim_bridge.devices.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.devices.magnet.lines import LineParameters, SwitchingParameters
@@ -106,9 +106,9 @@ OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout", "gcs", "a
 SEPARATE, FUSED = LAYOUTS = ("separate", "fused")
 LAST_SYSTEM = 250  # of PX4's MAV_SYS_ID
 GEOFENCE = ("geofence_low", "geofence_high")
-ARM_DRIVER = "arm_driver"
+ARM_DRIVER, CHECKLIST = "arm_driver", "checklist"
 # in `nodes`
-TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit", FLIGHT_CONTROLLER)
+TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, CHECKLIST, "recorder", "cockpit", FLIGHT_CONTROLLER)
 
 
 def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSettings:
@@ -309,7 +309,7 @@ def _nodes(top: Section) -> dict[str, dict[str, Any]]:
                     raise values.error(name, "follows from the section room")
         elif node == ARM_DRIVER:
             _tried(nodes, node, lambda v=values: ArmDriverParameters.from_mapping(v.values))
-        elif node == "checklist":
+        elif node == CHECKLIST:
             _tried(nodes, node, lambda v=values: check_checklist(v.values))
     return {node: dict(values) for node, values in given.items()}
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.supervision import PreflightCheck
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.observation import BAD, Box, Observation
 from uam_lab.preflight.checklist.step import UNKNOWN, at_least, at_most
 

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from uam_control.settings.checklist_parameters import ChecklistParameters
 from uam_control.settings.preflight_check import AUTOMATIC, GUIDED, PreflightCheck
+from uam_lab.flights.vehicle.checklist_parameters import ChecklistParameters
 from uam_lab.preflight.checklist.step import Situation, Step, StepState
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from uam_control.settings.checklist_parameters import MotionLimits
+from uam_lab.flights.vehicle.checklist_parameters import MotionLimits
 from uam_lab.preflight.checklist.motion_step import JointTurn, MotionStep, Shift, Turn
 from uam_lab.preflight.checklist.step import CONFIRM, Situation, Step, StepState
 

@@ -12,8 +12,8 @@ from enum import Enum
 import numpy as np
 
 from uam_control.maths.rotations import matrix_from_quaternion
-from uam_control.settings.checklist_parameters import MotionLimits
 from uam_control.supervision import PreflightCheck
+from uam_lab.flights.vehicle.checklist_parameters import MotionLimits
 from uam_lab.preflight.checklist.observation import (
     Sample,
     Window,
